@@ -108,12 +108,14 @@ async def switches(at: Target) -> int:
         for action in ("pen", "let_in", "conductor")
         for some in people
     ]
+    texts += [{"type": "grouping", "group": f"g{k}", "name": "", "put": people[k % 2]} for k in range(24)]
     first = b"".join(frame(json.dumps(text).encode()) for text in texts)
     flood = b"".join(
         frame(json.dumps(text).encode())
         for k in range(5)
         for text in (
             {"type": "conduct", "hands_off": k % 2 == 0, "hide": True, "animals": "en"},
+            {"type": "grouping", "group": f"g{k}", "pen": True, "put": people[k % 2]},
             {"type": "rename", "name": f"{k}" * 80},
             {"type": "presence", "cursor": [k, 1, 2]},
         )
@@ -157,6 +159,7 @@ async def pupil(at: Target) -> int:
         {"type": "ops", "ops": ops},
         {"type": "conduct", "hands_off": False},
         {"type": "people", "action": "undo", "people": ["-"]},
+        {"type": "grouping", "pen": True},
         {"type": "rename", "name": "x" * 80},
         {"type": "presence", "cursor": [1, 2, 3]},
     ]

@@ -139,8 +139,8 @@ class Artist:
 
     def __init__(self, door: str, terrain: str, secret: str, name: str) -> None:
         """``door``: the base of a node."""
-        self._name = name
-        self.live = LiveTerrain(f"{door}/t/{terrain}#{secret}", name=name, timeout=PATIENCE)
+        self._name, self.path = name, f"/t/{terrain}#{secret}"
+        self.live = LiveTerrain(door + self.path, name=name, timeout=PATIENCE)
         self._stop = threading.Event()
         self.drawn = 0
         self.pause = 0.02

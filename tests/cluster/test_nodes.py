@@ -8,8 +8,9 @@ from __future__ import annotations
 import json
 import signal
 
+from esker.api.live.client import LiveTerrain
 from tests.cluster.pair import Pair
-from tests.cluster.processes import Artist, all_is_there, gone_on, made, until
+from tests.cluster.processes import PATIENCE, Artist, all_is_there, gone_on, made, until
 
 
 def test_two_draw_through_different_nodes(pair: Pair) -> None:
@@ -33,6 +34,25 @@ def test_the_owner_is_killed_while_people_draw(pair: Pair) -> None:
     gone.end(signal.SIGKILL)
     gone_on(artists)
     assert left.figures()["esker_sockets_passing"] == 0, "it has the terrain itself"
+    all_is_there(artists)
+    gone.start()
+
+
+def test_groups_are_seen_through_every_node(pair: Pair) -> None:
+    """SPEC L161: by two devices of a teacher at different nodes, also when the node that has the terrain is killed."""
+    artists, gone, left = pair.drawn_on()
+    teacher, tablet = artists
+    person = teacher.live.members[0].person
+    teacher.live.group("red", name="Red", put=[person], pen=True)
+    until(lambda: [(each.name, each.people) for each in tablet.live.lesson.groups] == [("Red", (person,))])
+    tablet.live.group("red", name="Rot")
+    until(lambda: [each.name for each in teacher.live.lesson.groups] == ["Rot"])
+    for each in artists:
+        each.turn_to(left.base)
+    gone.end(signal.SIGKILL)
+    gone_on(artists)
+    with LiveTerrain(left.base + teacher.path, timeout=PATIENCE) as late:
+        until(lambda: [(each.name, each.people, each.pen) for each in late.lesson.groups] == [("Rot", (person,), True)])
     all_is_there(artists)
     gone.start()
 

@@ -125,6 +125,45 @@ SMALL = """() => {
 }"""
 
 
+def test_groups_are_on_every_device_of_who_leads(visitors: Visitors, server: Server) -> None:
+    """SPEC L160, L161: a group that is made on a laptop is given pens and a name on a tablet."""
+    terrain, secret = server.create(title="Groups")
+    link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, secret))
+    laptop = pupil(visitors, "Ms Ray", f"/t/{terrain}#{secret}", width=1100, height=720)
+    tablet = visitors(1024, 768, seen=True, has_touch=True)
+    tablet.open(f"/t/{terrain}#{secret}")
+    anne, ben = (pupil(visitors, name, f"/t/{terrain}#{link['secret']}") for name in ("Anne", "Ben"))
+    for each in (laptop, tablet):
+        press(each, "Inspector")
+        each.page.get_by_role("radio", name="Lesson").click()
+        each.page.get_by_text("4 people are here").wait_for()
+    groups, others = (each.page.locator("esk-lesson-groups") for each in (laptop, tablet))
+    press(laptop, "Make a group")
+    for name in ("Anne", "Ben"):
+        groups.get_by_label(name).check()
+    others.get_by_text("2 here").wait_for()
+    switch(laptop, "Hands off")
+    says(ben, "Hands off: drawing is paused")
+    press(tablet, "Give pens to Group 1")
+    for each in (anne, ben):
+        says(each, "You have a pen")
+    press(tablet, "Who is in Group 1")
+    others.get_by_label("Name of the group").fill("Red")
+    others.get_by_label("Ben").uncheck()
+    says(ben, "Hands off: drawing is paused")
+    groups.get_by_text("1 here").wait_for()
+    groups.get_by_role("button", name="Take the pens from Red").scroll_into_view_if_needed()
+    assert [groups.get_by_label(name).is_checked() for name in ("Anne", "Ben")] == [True, False]
+    laptop.shot("lesson-6-groups")
+    laptop.page.reload()
+    wait(laptop, "() => window.esker !== undefined && window.esker.ready()")
+    press(laptop, "Inspector")
+    laptop.page.get_by_role("radio", name="Lesson").click()
+    press(laptop, "Take the pens from Red")
+    says(anne, "Hands off: drawing is paused")
+    assert [each.errors for each in (laptop, tablet, anne, ben)] == [[], [], [], []]
+
+
 def test_a_lesson_is_led_from_a_phone(visitors: Visitors, server: Server) -> None:
     """SPEC L28: by touch at 390 and at 720 pixels: what is pressed has 40 pixels, and nothing scrolls sideways."""
     terrain, secret = server.create(title="Phone")

@@ -10,7 +10,7 @@ import pytest
 
 from esker import contract as c
 from esker.session.room import conducting
-from tests.sync.classroom import a_class, answer, lesson, people, strokes
+from tests.sync.classroom import a_class, answer, lesson, people, person, strokes
 from tests.sync.harness import LiveServer, Peer, set_op, stroke
 
 
@@ -50,6 +50,66 @@ def test_hands_off_holds_against_who_ignores_it(server: LiveServer) -> None:
     assert set(strokes(server, room)) == {"s-anne", "s-teacher", "s-ben", "s-more"}
 
 
+def grouping(peer: Peer, group: str | None, *members: Peer, **changes: Any) -> None:
+    peer.say("grouping", group=group, **changes, **({"put": [person(each) for each in members]} if members else {}))
+
+
+def test_groups_are_seen_by_all_who_lead_and_by_nobody_else(tmp_path: Path) -> None:
+    """SPEC L161: by a co-teacher, by another device of the teacher, after a kill of the server."""
+    with LiveServer(tmp_path / "living") as server:
+        room = a_class(server, "see")
+        grouping(room.teacher, "red", room.anne, room.ben, name="Red")
+        made = {"id": "red", "name": "Red", "people": [person(room.anne), person(room.ben)], "pen": False}
+        lesson(room.teacher, groups=[made])
+        tablet = server.join(room.terrain, room.owner, "see-t2")
+        assert tablet.welcome["lesson"]["groups"] == [made]
+        people(room.teacher, "conductor", room.anne)
+        assert lesson(room.anne, conducts=True)["groups"] == [made]
+        grouping(room.anne, "blue", room.ben, name="Blue")
+        apart = [
+            {**made, "people": [person(room.anne)]},
+            {**made, "id": "blue", "name": "Blue", "people": [person(room.ben)]},
+        ]
+        for peer in (room.anne, tablet, room.teacher):
+            lesson(peer, groups=apart)
+        people(tablet, "no_conductor", room.anne)
+        assert lesson(room.anne, conducts=False)["groups"] == []
+        shutil.copytree(tmp_path / "living", tmp_path / "killed")
+    with LiveServer(tmp_path / "killed") as server:
+        back = server.join(room.terrain, room.owner, "see-t3")
+        assert back.welcome["lesson"]["groups"] == apart
+        pupil = server.join(room.terrain, room.edit, "see-b3", ticket=room.ben.welcome["ticket"])
+        back.say("conduct", hands_off=True)
+        assert lesson(pupil, hands_off=True)["groups"] == []
+        for peer in (room.ben, pupil):
+            told = [peer.welcome["lesson"], *(message for message in peer.seen if message["type"] == "lesson")]
+            assert all(message["groups"] == [] for message in told), "no list of people reaches a pupil"
+
+
+def test_nobody_but_who_leads_changes_groups(server: LiveServer) -> None:
+    """SPEC L4, L164: pupils, who only looks, and a client that sends too much."""
+    room = a_class(server, "bad")
+    grouping(room.teacher, "red", room.anne, name="Red")
+    made = lesson(room.teacher)["groups"]
+    looker = server.http("POST", f"/api/terrains/{room.terrain}/links", {"role": "view"}, room.owner)[1]["secret"]
+    for peer in (room.anne, server.join(room.terrain, looker, "bad-v")):
+        for change in ({"name": "Mine"}, {"pen": True}, {"put": [person(room.ben)]}, {"forget": True}):
+            peer.say("grouping", group="red", **change)
+            assert "Only whoever leads" in peer.wait("notice")["text"]
+        peer.say("grouping", group=None, pen=True)
+        assert "Only whoever leads" in peer.wait("notice")["text"]
+    assert server.join(room.terrain, room.owner, "bad-t2").welcome["lesson"]["groups"] == made
+    for k in range(1, c.MAX_GROUPS):
+        grouping(room.teacher, f"g{k}", name="")
+    lesson(room.teacher)
+    grouping(room.teacher, "more", name="")
+    assert f"at most {c.MAX_GROUPS} groups" in room.teacher.wait("notice")["text"]
+    room.teacher.say("grouping", group="red", name="n" * (c.MAX_GROUP_NAME + 1))
+    code, error = room.teacher.closed()
+    assert code == c.WS_CLOSE["malformed"]
+    assert error is not None
+
+
 def test_a_group_has_its_pens_by_one_order(tmp_path: Path) -> None:
     """SPEC L160: whoever of it is away too, over reloads and a restart; nobody puts themself into a group."""
     with LiveServer(tmp_path) as server:
@@ -58,9 +118,9 @@ def test_a_group_has_its_pens_by_one_order(tmp_path: Path) -> None:
         room.teacher.say("conduct", hands_off=True)
         lesson(cho, hands_off=True)
         cho.close()
-        people(room.anne, "pen", room.anne, cho)
+        grouping(room.anne, "red", room.anne, cho, name="Red", pen=True)
         assert "Only whoever leads" in room.anne.wait("notice")["text"]
-        people(room.teacher, "pen", room.ben, cho)
+        grouping(room.teacher, "red", room.ben, cho, name="Red", pen=True)
         lesson(room.ben, draws=True)
         back = server.join(room.terrain, room.edit, "group-c2", ticket=cho.welcome["ticket"])
         assert back.welcome["lesson"]["draws"] is True
@@ -73,7 +133,7 @@ def test_a_group_has_its_pens_by_one_order(tmp_path: Path) -> None:
         )
         teacher = server.join(room.terrain, room.owner, "group-t3", ticket=room.teacher.welcome["ticket"])
         assert [peer.welcome["lesson"]["draws"] for peer in (ben, cho)] == [True, True]
-        people(teacher, "no_pen", ben, cho)
+        grouping(teacher, "red", pen=False)
         for peer, client in ((ben, "group-b3"), (cho, "group-c3")):
             lesson(peer, draws=False)
             assert answer(peer, f"{client}:0", stroke(f"s-{client}"))["code"] == "hands_off"

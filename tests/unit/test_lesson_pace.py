@@ -124,6 +124,30 @@ def test_everybody_is_told_at_a_pace() -> None:
     assert room.told(room.viewer) == []
 
 
+def test_only_conductors_hear_of_groups_unless_pens_change() -> None:
+    """SPEC L161: once the groups are written down."""
+    room = Room()
+    orders = (
+        (c.Grouping(group="red", name="Red", put=("anne",)), 0),
+        (c.Grouping(group="red", put=("anne",)), None),
+        (c.Grouping(group="red", pen=True), 1),
+        (c.Grouping(group="red", name="Rot"), 0),
+    )
+    for at, (order, heard) in enumerate(orders):
+        written = len(room.journal.written)
+        room.conducting.receive(room.owner, order)
+        if heard is None:
+            assert len(room.journal.written) == written, "nothing is new"
+            continue
+        assert room.told(room.owner) == []
+        room.journal.written[-1][1].set_result(None)
+        room.loop.at(101.0 + at)
+        assert [len(each["groups"]) for each in room.told(room.owner)] == [1]
+        assert [each["groups"] for each in room.told(room.viewer)] == [[]] * heard
+    room.conducting.receive(room.viewer, c.Grouping(group="blue", name="Blue"))
+    assert [each.id for each in room.core.lesson.state.groups] == ["red"]
+
+
 def test_only_conductors_hear_who_knocks_and_at_a_pace() -> None:
     """SPEC P537: who was removed may knock hundreds of times."""
     room = Room()

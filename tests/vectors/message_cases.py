@@ -13,6 +13,7 @@ from tests.vectors.scenes import Json, op
 
 HELLO: Json = {"type": "hello", "protocol": c.PROTOCOL_VERSION, "terrain": "t1", "secret": "s", "client": "c1"}
 VIEW: Json = {"type": "view", "eye": [0, 0, 100], "target": [1, 1, 0]}
+GROUPING: Json = {"type": "grouping", "group": "g1"}
 PRESENCE: Json = {"type": "presence", "cursor": [1, 2, 3.5], "tool": "mountain", "stroke": "c1-1"}
 
 
@@ -70,6 +71,9 @@ ACCEPT: list[tuple[str, Json]] = [
     ("ping", {"type": "ping", "t": 12.5}),
     ("hello to look at the past", HELLO | {"at": 0}),
     ("seek", {"type": "seek", "clock": 12}),
+    ("a group of a lesson", GROUPING | {"name": "Rot", "pen": True, "put": ["p1"] * c.MAX_PEOPLE, "out": ["p2"]}),
+    ("every group of a lesson", {"type": "grouping", "pen": False}),
+    ("a group that is forgotten", GROUPING | {"forget": True}),
 ]
 
 REFUSE: list[tuple[str, Json | str]] = [
@@ -81,6 +85,10 @@ REFUSE: list[tuple[str, Json | str]] = [
     ("unknown type", {"type": "teleport"}),
     ("the past of a clock before the first", HELLO | {"at": -1}),
     ("seek to no clock", {"type": "seek"}),
+    ("a group of a long name", GROUPING | {"name": "n" * (c.MAX_GROUP_NAME + 1)}),
+    ("a group of too many people", GROUPING | {"put": ["p"] * (c.MAX_PEOPLE + 1)}),
+    ("a group of somebody without an id", GROUPING | {"put": ["two words"]}),
+    ("a group under no id", GROUPING | {"group": ""}),
     ("seek to a part of a clock", {"type": "seek", "clock": 1.5}),
     ("null type", {"type": None}),
     ("a field that does not exist", HELLO | {"admin": True}),

@@ -6,8 +6,8 @@ from typing import Final
 
 # --- protocol ---------------------------------------------------------------------------------------------------
 
-PROTOCOL_VERSION: Final = 8
-SUBPROTOCOL: Final = "esker.8"
+PROTOCOL_VERSION: Final = 9
+SUBPROTOCOL: Final = "esker.9"
 
 # --- grid (DESIGN 3) --------------------------------------------------------------------------------------------
 
@@ -203,6 +203,11 @@ UNSEEN: Final = {
 what takes no room. What joins letters and emoji (U+200C, U+200D) stays. Tabs and line ends become spaces."""
 MAX_PEOPLE: Final = 200
 """People that one message of a conductor may name."""
+MAX_GROUPS: Final = 24
+"""Groups of people that a lesson has."""
+MAX_GROUP_NAME: Final = 40
+MAX_GROUPED: Final = 400
+"""People in all groups of a lesson together."""
 MAX_OPS_PER_MESSAGE: Final = 256
 MAX_OPS_PER_GROUP: Final = 64
 DOMAIN_MARGIN: Final = 10.0

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, StringConstraints
 
-from esker.contract.constants import MAX_PEOPLE
-from esker.contract.values import Animals, Id, Line, Name, Wire
+from esker.contract.constants import MAX_GROUP_NAME, MAX_GROUPED, MAX_GROUPS, MAX_PEOPLE
+from esker.contract.values import Animals, Id, Line, Name, Wire, plain
 
 PersonAction = Literal["pen", "no_pen", "conductor", "no_conductor", "remove", "let_in", "undo"]
+GroupName = Annotated[str, StringConstraints(max_length=MAX_GROUP_NAME), AfterValidator(plain)]
 
 
 class Conduct(Wire):
@@ -43,6 +44,36 @@ class People(Wire):
     people: Annotated[tuple[Id, ...], Field(min_length=1, max_length=MAX_PEOPLE)]
 
 
+class Grouping(Wire):
+    """What a conductor changes of one group of people. What is null stays as it is, and of two orders the last counts.
+
+    ``group``: its id, made by whoever makes the group; null: every group, of which only ``pen`` can be changed then.
+    ``name``: what it is called; with a name an id that nobody knows makes a group. ``pen``: whether its people have
+    pens; they get them, or lose them, and so does who is put into it or taken out later. ``put``: people who are in it
+    from now on, and in no other; ``out``: people who are in it no more; ``forget``: there is no such group any more.
+    """
+
+    type: Literal["grouping"] = "grouping"
+    group: Id | None = None
+    name: GroupName | None = None
+    pen: bool | None = None
+    put: Annotated[tuple[Id, ...], Field(max_length=MAX_PEOPLE)] = ()
+    out: Annotated[tuple[Id, ...], Field(max_length=MAX_PEOPLE)] = ()
+    forget: bool = False
+
+
+class PenGroup(Wire):
+    """People, by their ids, to whom pens are given together. ``pen``: whether they have them."""
+
+    id: Id
+    name: GroupName = ""
+    people: Annotated[tuple[Id, ...], Field(max_length=MAX_GROUPED)] = ()
+    pen: bool = False
+
+
+PenGroups = Annotated[tuple[PenGroup, ...], Field(max_length=MAX_GROUPS)]
+
+
 class Outsider(Wire):
     """Somebody who was removed, or who waits to be let in."""
 
@@ -59,7 +90,7 @@ class Notice(Wire):
 
 class Lesson(Wire):
     """How the lesson stands, as one member may know it. ``look``: the client that all views follow; ``draws`` and
-    ``conducts`` are about the reader; ``removed`` and ``waiting`` are told to conductors only."""
+    ``conducts`` are about the reader; ``removed``, ``waiting`` and ``groups`` are told to conductors only."""
 
     type: Literal["lesson"] = "lesson"
     hands_off: bool = False
@@ -72,3 +103,4 @@ class Lesson(Wire):
     conducts: bool = False
     removed: tuple[Outsider, ...] = ()
     waiting: tuple[Outsider, ...] = ()
+    groups: PenGroups = ()

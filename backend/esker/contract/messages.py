@@ -10,7 +10,7 @@ from esker.contract.classes import InClass
 from esker.contract.constants import DEFAULT_TAU_PX, MAX_OPS_PER_MESSAGE
 from esker.contract.document import Document
 from esker.contract.imports import ImportStatus
-from esker.contract.lesson import Conduct, Lesson, Notice, People
+from esker.contract.lesson import Conduct, Grouping, Lesson, Notice, People
 from esker.contract.operations import CloseCode, Op, OpEnvelope, OrderedOp, RejectCode
 from esker.contract.tasks import Score
 from esker.contract.values import Clock, Colour, Id, Name, OpId, Role, Secret, Ticket, Token, Vec3, Wire
@@ -98,7 +98,8 @@ class Ping(Wire):
 
 
 ClientMessage = Annotated[
-    Hello | Ops | View | Presence | Credit | Rename | Seek | Ping | Conduct | People, Field(discriminator="type")
+    Hello | Ops | View | Presence | Credit | Rename | Seek | Ping | Conduct | People | Grouping,
+    Field(discriminator="type"),
 ]
 
 

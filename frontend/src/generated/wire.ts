@@ -147,6 +147,19 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
     },
     may: {},
   },
+  Grouping: {
+    must: {
+      type: { oneOf: ["grouping"] },
+    },
+    may: {
+      group: { nullable: { matches: "^[A-Za-z0-9_-]{1,40}$" } },
+      name: { nullable: { text: [0, 40] } },
+      pen: { nullable: { bool: true } },
+      put: { list: { matches: "^[A-Za-z0-9_-]{1,40}$" }, length: [0, 200] },
+      out: { list: { matches: "^[A-Za-z0-9_-]{1,40}$" }, length: [0, 200] },
+      forget: { bool: true },
+    },
+  },
   Hello: {
     must: {
       type: { oneOf: ["hello"] },
@@ -466,6 +479,6 @@ export const WIRE_MODELS: Readonly<Record<string, WireModel>> = {
 };
 
 export const WIRE_UNIONS = {
-  ClientMessage: ["Hello", "Ops", "View", "Presence", "Credit", "Rename", "Seek", "Ping", "Conduct", "People"],
+  ClientMessage: ["Hello", "Ops", "View", "Presence", "Credit", "Rename", "Seek", "Ping", "Conduct", "People", "Grouping"],
   Op: ["BeginStroke", "AppendPoints", "FinishStroke", "SetStroke", "MoveAnchor", "DeleteStroke", "RestoreStroke", "SetTerrain", "AddLayer", "SetLayer", "DeleteLayer", "RestoreLayer", "Group"],
 };

@@ -99,7 +99,7 @@ class LiveConnection:
             if not done:
                 raise TimeoutError(what)
 
-    def say(self, message: c.Conduct | c.People) -> None:
+    def say(self, message: c.Conduct | c.People | c.Grouping) -> None:
         """Sends a message. Raises RuntimeError while there is no connection."""
         self.raise_closed()
         socket = self._socket

@@ -134,3 +134,12 @@ class LiveLesson:
         Raises ValueError, and RuntimeError while nobody is connected.
         """
         self._connection.say(arguments.model(c.People, {"action": action, "people": tuple(people)}))
+
+    def group(self, group: str | None, **changes: object) -> None:
+        """Changes a group of people (``lesson.groups``) by its id, or with None every group: ``name`` (which makes a
+        group of a new id), ``pen``, ``put`` and ``out`` (people by their ids), ``forget``. What is not named stays.
+
+        Raises ValueError, and RuntimeError while nobody is connected.
+        """
+        people = {name: tuple(value) for name, value in changes.items() if isinstance(value, list | tuple)}
+        self._connection.say(arguments.model(c.Grouping, {"group": group, **changes, **people}))

@@ -12,7 +12,7 @@ from typing import Final, Protocol
 
 from esker import contract as c
 from esker.contract import RejectCode, Role
-from esker.session.lesson import names
+from esker.session.lesson import groups, names
 from esker.session.lesson.state import MOST, Removed, State, with_people, without
 
 HANDS_OFF: Final = "Hands off: whoever leads the lesson has paused drawing for now."
@@ -180,6 +180,7 @@ class Lesson:
             conducts=conducts,
             removed=removed,
             waiting=waiting,
+            groups=state.groups if conducts else (),
         )
 
     # --- the door -----------------------------------------------------------------------------------------------
@@ -244,6 +245,14 @@ class Lesson:
                 return self._named({"removed": removed, "let_in": with_people(state.let_in, people)})
         return state
 
+    def grouped(self, message: c.Grouping) -> State | str:
+        """The state after what a conductor changed of groups; or why that cannot be."""
+        state = self.state
+        after = groups.changed(state.groups, message)
+        if isinstance(after, str):
+            return after
+        return self._named({"groups": after, "pens": groups.pens(state.pens, state.groups, after)})
+
     def sent_out(self, out: Iterable[Removed]) -> State:
         """The state after these people were removed."""
         new = tuple(out)
@@ -257,6 +266,7 @@ class Lesson:
                 "pens": without(state.pens, people),
                 "conductors": without(state.conductors, people),
                 "let_in": without(state.let_in, people),
+                "groups": groups.leaving(state.groups, people),
                 "look": None if state.look in people else state.look,
             }
         )

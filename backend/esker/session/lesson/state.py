@@ -28,7 +28,8 @@ class Removed(c.Wire):
 
 
 class State(c.Wire):
-    """Switches, and people by their ids. ``look``: the person whose view all follow; ``named``: numbers of animals."""
+    """Switches, and people by their ids. ``look``: the person whose view all follow; ``named``: numbers of animals;
+    ``groups``: people to whom pens are given together, in the order in which the groups were made."""
 
     hands_off: bool = False
     protect: bool = False
@@ -41,6 +42,7 @@ class State(c.Wire):
     removed: Annotated[tuple[Removed, ...], Field(max_length=MOST)] = ()
     let_in: People = ()
     named: dict[c.Id, Annotated[int, Field(ge=0)]] = Field(default_factory=dict)
+    groups: c.PenGroups = ()
 
 
 def read(text: str | None, terrain: str) -> State:

@@ -165,13 +165,15 @@ class Conducting:
 
     # --- what conductors say ------------------------------------------------------------------------------------
 
-    def receive(self, member: Member, message: c.Conduct | c.People) -> None:
+    def receive(self, member: Member, message: c.Conduct | c.People | c.Grouping) -> None:
         """Does what a member asks, if they may."""
         if not self._core.lesson.conducts(member):
             member.outbox.message(c.Notice(text=NO_CHANGE))
             return
         if isinstance(message, c.Conduct):
             self._switch(member, message)
+        elif isinstance(message, c.Grouping):
+            self._group(member, message)
         elif message.action == "undo":
             self._undo(member, message.people)
         elif message.action == "remove":
@@ -189,6 +191,19 @@ class Conducting:
         self._change(state, member)
         if state.hands_off:
             self._finish_what_is_in_hand()
+
+    def _group(self, member: Member, message: c.Grouping) -> None:
+        """Changes groups. Who is in which is told to conductors alone; everybody hears of it only where pens change."""
+        lesson = self._core.lesson
+        state = lesson.grouped(message)
+        if isinstance(state, str):
+            member.outbox.message(c.Notice(text=state))
+        elif state.pens != lesson.state.pens:
+            self._change(state, member)
+        elif state.groups != lesson.state.groups:
+            lesson.state = state
+            self._some = True
+            self._keep((member,))
 
     def _change(self, state: State, by: Member | None) -> None:
         """The lesson stands so from now on."""

@@ -59,7 +59,7 @@ class Refused:
 class Message:
     """A well-formed view, presence, credit, rename, seek, or what a conductor says."""
 
-    body: c.View | c.Presence | c.Credit | c.Rename | c.Seek | c.Conduct | c.People
+    body: c.View | c.Presence | c.Credit | c.Rename | c.Seek | c.Conduct | c.People | c.Grouping
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class Connection:
             case c.Rename():
                 if not self._renames.take(now):
                     return self._notice(f"More than {RENAMES_PER_SECOND} new names a second.", now)
-            case c.Conduct() | c.People():
+            case c.Conduct() | c.People() | c.Grouping():
                 if not self._conducts.take(now):
                     return self._notice(f"More than {CONDUCTS_PER_SECOND} switches of a lesson a second.", now)
             case c.Ping():

@@ -224,7 +224,7 @@ class Room(ClassRoom):
                 self._presence_soon()
                 if guest.member.client in self._called and guest.member.role != "view":
                     self._journal.append(self.id, (), None, self._new_names((guest.member.client,)))
-            case protocol.Message((c.Conduct() | c.People()) as message):
+            case protocol.Message((c.Conduct() | c.People() | c.Grouping()) as message):
                 self.conducting.receive(guest.member, message)
             case protocol.Reply(message):
                 guest.member.outbox.message(message)

@@ -112,6 +112,10 @@ ALTER TABLE people ADD COLUMN conducts INTEGER;
 _FORMAT_8: Final = ""
 """No table changes: ops and documents may hold tasks, which an Esker of before would take for damage."""
 
+_FORMAT_9: Final = ""
+"""No table changes: the state of a lesson may hold groups. An Esker of before could not read it and would lift every
+switch of that lesson."""
+
 
 def _script(text: str) -> Callable[[sqlite3.Connection], None]:
     def run(db: sqlite3.Connection) -> None:
@@ -136,6 +140,7 @@ STEPS: Final[tuple[Callable[[sqlite3.Connection], None], ...]] = (
     _folding,  # bursts of ops are folded
     _script(_FORMAT_7 + ";" + _CLASSES),  # lessons, classes and their copies
     _script(_FORMAT_8),  # tasks
+    _script(_FORMAT_9),  # groups of a lesson
 )
 """``STEPS[n]`` makes format n + 1 of format n; an empty file has format 0."""
 FORMAT: Final = len(STEPS)

@@ -22,6 +22,7 @@ export const NOBODY_LEADS: Lesson = {
   conducts: false,
   removed: [],
   waiting: [],
+  groups: [],
 };
 
 const UNCHANGED: Conduct = {
@@ -69,7 +70,7 @@ export class LessonView {
     this.#lift = lift;
     this.#key = `esker.ticket.${host.id}`;
     this.drafts = new Drafts(host.store, host.id);
-    this.groups = new Groups(host.store, host.id, (action, people) => this.about(action, people));
+    this.groups = new Groups(this.state, (order) => host.connection.send(order));
     this.leader = computed(() => {
       const { look, held } = this.state.value;
       return look === null || look === host.client || (this.away.value && !held) ? null : look;

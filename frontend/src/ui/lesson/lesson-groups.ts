@@ -1,8 +1,8 @@
 import { msg, str } from "@lit/localize";
 import { html, nothing, type TemplateResult } from "lit";
 import { memberName } from "../../app/device/names.ts";
-import { type Group, type Groups, MOST_GROUP_NAME, MOST_GROUPS } from "../../app/lesson/groups.ts";
-import type { Member } from "../../generated/contract.ts";
+import type { Groups } from "../../app/lesson/groups.ts";
+import { MAX_GROUP_NAME, MAX_GROUPS, type Member, type PenGroup } from "../../generated/contract.ts";
 import { icon } from "../controls/icons.ts";
 import { SignalElement } from "../controls/signal-element.ts";
 import { panelStyles } from "../styles/panel.ts";
@@ -17,8 +17,8 @@ export class EskLessonGroups extends SignalElement {
   declare groups: Groups;
   /** Who is here and may be in a group. */
   declare pupils: readonly Member[];
-  /** The group whose people are being chosen. */
-  declare open: number | null;
+  /** Id of the group whose people are being chosen. */
+  declare open: string | null;
 
   constructor() {
     super();
@@ -32,10 +32,10 @@ export class EskLessonGroups extends SignalElement {
       <h3>${msg("Groups")}</h3>
       ${list.length === 0 ? html`<p class="quietly">${msg("Give the pen to several people at once: make a group and choose who is in it.")}</p>` : nothing}
       <ul>
-        ${list.map((group, at) => this.#group(group, at))}
+        ${list.map((group) => this.#group(group))}
       </ul>
       <div class="all">
-        <button class="btn outline" ?disabled=${list.length >= MOST_GROUPS} @click=${() => this.#make(list.length)}>
+        <button class="btn outline" ?disabled=${list.length >= MAX_GROUPS} @click=${() => this.#make(list.length)}>
           ${icon("plus")} ${msg("Make a group")}
         </button>
       </div>
@@ -46,11 +46,11 @@ export class EskLessonGroups extends SignalElement {
     const taken = new Set(this.groups.list.peek().map(({ name }) => name));
     let number = count + 1;
     while (taken.has(msg(str`Group ${number}`))) number += 1;
-    if (this.groups.make(msg(str`Group ${number}`))) this.open = count;
+    this.open = this.groups.make(msg(str`Group ${number}`)) ?? this.open;
   }
 
-  #group(group: Group, at: number): TemplateResult {
-    const isOpen = this.open === at;
+  #group(group: PenGroup): TemplateResult {
+    const isOpen = this.open === group.id;
     const pen = group.pen ? msg(str`Take the pens from ${group.name}`) : msg(str`Give pens to ${group.name}`);
     const who = isOpen ? msg(str`Close ${group.name}`) : msg(str`Who is in ${group.name}`);
     return html`<li>
@@ -60,39 +60,44 @@ export class EskLessonGroups extends SignalElement {
           title=${who}
           aria-expanded=${isOpen}
           @click=${() => {
-            this.open = isOpen ? null : at;
+            this.open = isOpen ? null : group.id;
           }}
         >
           ${group.name || msg("Without a name")} <small>${this.#count(group)}</small>
         </button>
-        <button class="icon-btn pen" aria-label=${pen} title=${pen} aria-pressed=${group.pen} @click=${() => this.groups.pen(at, !group.pen)}>
+        <button class="icon-btn pen" aria-label=${pen} title=${pen} aria-pressed=${group.pen} @click=${() => this.groups.pen(group.id, !group.pen)}>
           ${icon("pen")}
         </button>
-        <button class="icon-btn" aria-label=${msg(str`Forget ${group.name}`)} title=${msg(str`Forget ${group.name}`)} @click=${() => this.#remove(at)}>
+        <button class="icon-btn" aria-label=${msg(str`Forget ${group.name}`)} title=${msg(str`Forget ${group.name}`)} @click=${() => this.#remove(group)}>
           ${icon("trash")}
         </button>
       </li>
-      ${isOpen ? this.#choices(group, at) : nothing}`;
+      ${isOpen ? this.#choices(group) : nothing}`;
   }
 
-  #count({ people }: Group): string {
+  #count({ people }: PenGroup): string {
     const here = this.pupils.filter((member) => people.includes(member.person)).length;
     return here === people.length ? msg(str`${here} here`) : msg(str`${here} of ${people.length} here`);
   }
 
-  #remove(at: number): void {
-    this.groups.remove(at);
-    this.open = null;
+  #remove({ id }: PenGroup): void {
+    this.groups.remove(id);
+    if (this.open === id) this.open = null;
   }
 
-  #choices(group: Group, at: number): TemplateResult {
+  #choose({ id }: PenGroup, { person }: Member, box: HTMLInputElement): void {
+    if (!box.checked) this.groups.takeOut(person, id);
+    else if (!this.groups.put(person, id)) box.checked = false;
+  }
+
+  #choices(group: PenGroup): TemplateResult {
     return html`<li class="inside">
       <input
         class="field"
         aria-label=${msg("Name of the group")}
-        maxlength=${MOST_GROUP_NAME}
+        maxlength=${MAX_GROUP_NAME}
         .value=${group.name}
-        @change=${(e: Event) => this.groups.rename(at, (e.target as HTMLInputElement).value)}
+        @change=${(e: Event) => this.groups.rename(group.id, (e.target as HTMLInputElement).value)}
       />
       ${this.pupils.length === 0 ? html`<p class="quietly">${msg("Nobody else is here yet")}</p>` : nothing}
       ${this.pupils.map(
@@ -100,10 +105,7 @@ export class EskLessonGroups extends SignalElement {
           <input
             type="checkbox"
             .checked=${group.people.includes(member.person)}
-            @change=${(e: Event) =>
-              (e.target as HTMLInputElement).checked
-                ? this.groups.put(member.person, at)
-                : this.groups.takeOut(member.person, at)}
+            @change=${(e: Event) => this.#choose(group, member, e.target as HTMLInputElement)}
           />
           <span class="spot" style=${`background:${member.colour}`}></span> ${memberName(member)}
         </label>`,

@@ -104,7 +104,10 @@ CREATE TRIGGER terrain_gone AFTER DELETE ON esker.terrains FOR EACH ROW EXECUTE 
 """``leases``: who has a terrain, in which taking, and until when by the database's clock; a row for every terrain, so
 that a write for one that nobody has can lock it. ``nodes``: the servers."""
 
-STEPS: Final[dict[int, str]] = {FIRST: _FORMAT_8}
+_FORMAT_9: Final = ""
+"""No table changes (``upkeep/migrations.py``)."""
+
+STEPS: Final[dict[int, str]] = {FIRST: _FORMAT_8, 9: _FORMAT_9}
 """What makes the format of this number of the one before; the first makes it of nothing."""
 
 
@@ -140,7 +143,7 @@ def _migrate(db: Database, url: str, now: float) -> None:
     if not present:
         db.execute(f"CREATE SCHEMA IF NOT EXISTS {SCHEMA}")
     for number, step in sorted(STEPS.items()):
-        if number > present:
+        if number > present and step:
             _script(db, step)
     state = f"INSERT INTO {SCHEMA}.server VALUES ($1,$2) ON CONFLICT (key) DO UPDATE SET value=excluded.value"
     db.execute(state, ("format", str(FORMAT)))
