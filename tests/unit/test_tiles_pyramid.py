@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import gc
+import sys
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from esker import grid
-from esker.contract import Channel, Predictor
+from esker.contract import Predictor
 from esker.grid import TileKey
 from esker.tiles.codec.frame import TileRecord
 from esker.tiles.codec.payload import SAMPLE_LIMIT
 from esker.tiles.delivery import TileServer
 from esker.tiles.ledger import state_of
-from esker.tiles.plans import EncodedTiles
+from esker.tiles.plans import ENTRY_BYTES, EncodedTiles
 from esker.tiles.pyramid import Pyramid, quantise
 
 SIZE_M = 1024.0
@@ -191,13 +194,32 @@ def test_levels_that_were_never_put_are_not_valid() -> None:
 
 
 def test_the_cache_of_coded_tiles_is_bounded_and_forgets_the_oldest() -> None:
-    cache = EncodedTiles(limit=1000)
+    limit = 10 * (100 + ENTRY_BYTES)
+    cache = EncodedTiles(limit)
     for i in range(30):
-        cache.put((Channel.HEIGHT, ROOT, i, 0, 0, 0), TileRecord(0, 0, Predictor.ZERO, 0, i, 0, bytes(100)))
-        assert cache.get((Channel.HEIGHT, ROOT, 0, 0, 0, 0)) is not None  # used again and again, so it stays
-    assert cache.bytes <= 1000
-    assert cache.get((Channel.HEIGHT, ROOT, 1, 0, 0, 0)) is None
-    assert cache.get((Channel.HEIGHT, ROOT, 29, 0, 0, 0)) is not None
+        cache.put((0, *ROOT, i, 0, 0, 0), TileRecord(0, 0, Predictor.ZERO, 0, i, 0, bytes(100)))
+        assert cache.get((0, *ROOT, 0, 0, 0, 0)) is not None  # used again and again, so it stays
+    assert cache.bytes <= limit
+    assert cache.get((0, *ROOT, 1, 0, 0, 0)) is None
+    assert cache.get((0, *ROOT, 29, 0, 0, 0)) == TileRecord(0, 0, Predictor.ZERO, 0, 29, 0, bytes(100))
+
+
+def test_the_garbage_collector_does_not_go_through_coded_tiles() -> None:
+    """SPEC S593: records and keys of small tiles held the whole server up for a third of a second."""
+    cache = EncodedTiles()
+    for i in range(100):
+        cache.put((0, *ROOT, i, 0, 0, 0), TileRecord(0, 0, Predictor.ZERO, 0, i, 0, bytes(10)))
+    gc.collect()
+    assert not any(gc.is_tracked(held) for entry in cache._items.items() for held in entry)
+    assert cache.bytes >= sum(sys.getsizeof(held) for entry in cache._items.items() for held in entry)
+
+
+def test_small_tiles_count_for_what_they_take() -> None:
+    """SPEC S593: payloads of ten bytes were as many as three million in a room before they counted."""
+    cache = EncodedTiles(limit=100 * ENTRY_BYTES)
+    for i in range(1000):
+        cache.put((0, *ROOT, i, 0, 0, 0), TileRecord(0, 0, Predictor.ZERO, 0, i, 0, b""))
+    assert len(cache._items) == 100
 
 
 def test_clients_share_coded_tiles() -> None:
@@ -214,7 +236,7 @@ def test_clients_share_coded_tiles() -> None:
             client.commit(plan)
     half = len(plans) // 2
     assert plans[:half] == plans[half:]
-    assert server.cache.bytes < sum(len(p) for p in plans[:half])
+    assert server.cache.bytes - ENTRY_BYTES * len(server.cache._items) < sum(len(p) for p in plans[:half])
 
 
 def test_earlier_states_of_levels_are_kept_only_while_somebody_holds_tiles_of_them() -> None:

@@ -20,13 +20,19 @@ from esker.tiles.codec.filters import pack_smallest
 from esker.tiles.codec.frame import FrameHead, TileRecord, ratio, write_frame
 from esker.tiles.codec.payload import Ints, Wide, child_window, cost, predict
 
-CACHE_BYTES: Final = 32 * 1024 * 1024
+CACHE_BYTES: Final = 16 << 20
 
 DIFFERENCES: Final = (Filter.ROW, Filter.PLANE)
 
-CacheKey = tuple[Channel, TileKey, int, int, int, int]
-"""Channel, tile, its version, its parent's version; then the versions of both that the tile may be predicted from
-instead, 0 for none."""
+ENTRY_BYTES: Final = 640
+"""What an entry of the cache takes beside its payload. While somebody draws most payloads are smaller."""
+
+CacheKey = tuple[int, int, int, int, int, int, int, int]
+"""Channel; level, x and y of the tile; its version, its parent's version; then the versions of both that the tile may
+be predicted from instead, 0 for none."""
+_Coded = tuple[int, int, int, int, int, int, bytes, int]
+"""The fields of a ``TileRecord``. Numbers and bytes in plain tuples are nothing that Python's garbage collector goes
+through: a cache of records and keys was most of what it did, and the whole server waits for it."""
 
 
 class EncodedTiles:
@@ -34,33 +40,49 @@ class EncodedTiles:
     threads."""
 
     def __init__(self, limit: int = CACHE_BYTES) -> None:
+        """``limit``: bytes of payloads and of what entries take beside them."""
         self._limit = limit
         self._lock = threading.Lock()
-        self._items: OrderedDict[CacheKey, TileRecord] = OrderedDict()
+        self._items: OrderedDict[CacheKey, _Coded] = OrderedDict()
         self._bytes = 0
 
     def get(self, key: CacheKey) -> TileRecord | None:
         """Returns the coded tile, or None."""
         with self._lock:
             found = self._items.get(key)
-            if found is not None:
-                self._items.move_to_end(key)
-            return found
+            if found is None:
+                return None
+            self._items.move_to_end(key)
+        return _record(found)
 
     def put(self, key: CacheKey, value: TileRecord) -> None:
         """Keeps a coded tile and forgets the least recently used ones above the limit."""
         with self._lock:
             if key in self._items:
                 return
-            self._items[key] = value
-            self._bytes += len(value.payload)
+            self._items[key] = _plain(value)
+            self._bytes += len(value.payload) + ENTRY_BYTES
             while self._bytes > self._limit and len(self._items) > 1:
-                self._bytes -= len(self._items.popitem(last=False)[1].payload)
+                payload = self._items.popitem(last=False)[1][_PAYLOAD]
+                self._bytes -= len(payload) + ENTRY_BYTES
 
     @property
     def bytes(self) -> int:
-        """Bytes of the payloads held."""
+        """Bytes that are counted."""
         return self._bytes
+
+
+_PAYLOAD: Final = 6
+
+
+def _plain(tile: TileRecord) -> _Coded:
+    numbers = tile.x, tile.y, int(tile.predictor), tile.shift, tile.version, tile.base_version
+    return *numbers, bytes(tile.payload), int(tile.filter)
+
+
+def _record(coded: _Coded) -> TileRecord:
+    x, y, predictor, shift, version, base_version, payload, kind = coded
+    return TileRecord(x, y, Predictor(predictor), shift, version, base_version, payload, Filter(kind))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +110,7 @@ class TilePlan:
     def cache_key(self, channel: Channel) -> CacheKey:
         """Returns all that the coded bytes depend on."""
         parent, before, above = (0 if s is None else s.version for s in (self.parent, self.before, self.parent_before))
-        return channel, self.key, self.now.version, parent, before, above
+        return int(channel), *self.key, self.now.version, parent, before, above
 
 
 @dataclass(frozen=True, eq=False)
