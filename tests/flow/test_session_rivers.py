@@ -18,8 +18,8 @@ from esker import grid
 from esker.document.ops import StrokeSet
 from esker.server.hydrology import Hydrology, Snapshot, snapshot
 from esker.session import rivers as session_rivers
-from esker.session.ground.feed import TileFeed
-from esker.session.ground.tilethread import TileThread
+from esker.session.ground.frames.feed import TileFeed
+from esker.session.ground.frames.tilethread import TileThread
 from esker.session.rivers import (
     EVERY_SECONDS,
     GATE_SECONDS,
@@ -333,7 +333,7 @@ def test_a_search_that_fails_is_logged_and_the_next_one_runs(now: None, caplog: 
 class Outlet:
     """A connection that takes what it is given."""
 
-    closing = None
+    closing, home = None, ""
 
     def __init__(self) -> None:
         self.has_frames = asyncio.Event()

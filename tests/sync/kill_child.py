@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from esker import contract as c
-from esker.session.ground.tilethread import TileThread
+from esker.session.ground.frames.tilethread import TileThread
 from esker.session.ground.worker import Worker
 from esker.session.room import protocol
 from esker.session.room.core import RoomCore, RoomInfo

@@ -68,15 +68,19 @@ class World:
         self.worker._repairs.open()
         self.settled: dict[str, list[float]] = {}
         self.previews: dict[str, list[float]] = {}
+        self.coarse: dict[str, list[float]] = {}
+        """When the coarsest previews came."""
         self.slices: dict[Client, float] = {}
         self.churning: list[tuple[Client, float, float]] = []
         """Rooms whose document changes all the time: what a slice of theirs takes, and when they changed last."""
         self.clock = 0
 
     def room(self, name: str, home: str | None = None) -> Client:
-        self.settled[name], self.previews[name] = [], []
+        self.settled[name], self.previews[name], self.coarse[name] = [], [], []
 
         def deliver(_: int, result: Any) -> None:
+            if result.level == 0 and not result.settled:
+                self.coarse[name].append(self.now)
             if result.level == LEVELS:
                 (self.settled if result.settled else self.previews)[name].append(self.now)
 
@@ -162,6 +166,23 @@ def test_a_room_settles_while_a_stranger_opens_one_after_another() -> None:
     world.run(60.0)
     [settled] = world.settled["light"]
     assert settled < 3 * by_itself + 3 * AHEAD
+
+
+def test_who_drew_before_sees_a_stroke_at_once_though_a_stranger_opens_sixty_rooms() -> None:
+    """SPEC P646: rooms that never had a turn came first, so each of sixty did before whoever had drawn a while ago."""
+    world = World()
+    mine = world.room("mine", "198.51.100.1")
+    world.churning.append((mine, 0.02, 0.0))
+    world.run(5.0)
+    world.churning.clear()
+    world.run(5.0)
+    for k in range(60):
+        world.ask(world.room(f"r{k}", "203.0.113.7"), 0.02)
+    asked = world.now
+    world.ask(mine, 0.02)
+    world.run(30.0)
+    assert min(at for at in world.coarse["mine"] if at > asked) - asked < 4 * 0.02
+    assert all(world.settled[f"r{k}"] for k in range(60))
 
 
 def test_a_room_is_of_whoever_draws_in_it() -> None:

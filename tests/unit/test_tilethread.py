@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import threading
+import time
 from concurrent.futures import CancelledError
 
 import pytest
 
 from esker.fairness.rounds import Rounds
-from esker.session.ground.tilethread import Lane, TileThread
+from esker.session.ground.frames.tilethread import Lane, TileThread
 
 
 def test_what_is_first_runs_before_what_waits_and_each_in_its_order() -> None:
@@ -54,9 +55,8 @@ class Held:
     """A thread that is held while work is given to it, and what it then did."""
 
     def __init__(self) -> None:
-        self.now = 0.0
         self.log: list[str] = []
-        self.thread, self._gate = TileThread(now=lambda: self.now), threading.Event()
+        self.thread, self._gate = TileThread(), threading.Event()
         started = threading.Event()
 
         def hold() -> None:
@@ -92,15 +92,14 @@ def test_sixty_rooms_of_one_address_have_one_turn_before_the_next() -> None:
 
 
 def test_frames_come_while_levels_of_another_address_come_without_end() -> None:
-    """SPEC A445: frames were made only when no level of anybody waited."""
+    """SPEC A445: frames were made only when no level of anybody waited, or had waited for a tenth of a second each."""
     held = Held()
     stranger, mine = held.lane("stranger"), held.lane("me")
     for k in range(6):
         stranger.first(held.log.append, f"s{k}")
     for name in ("f0", "f1"):
         mine.submit(held.log.append, name)
-    held.now = 1.0
-    assert held.done() == ["f0", "s0", "f1", "s1", "s2", "s3", "s4", "s5"]
+    assert held.done() == ["s0", "f0", "s1", "f1", "s2", "s3", "s4", "s5"]
 
 
 def test_frames_of_who_has_levels_wait_for_these() -> None:
@@ -108,9 +107,48 @@ def test_frames_of_who_has_levels_wait_for_these() -> None:
     held = Held()
     lane = held.lane("me")
     lane.submit(held.log.append, "f")
-    held.now = 1.0
     lane.first(held.log.append, "l")
     assert held.done() == ["l", "f"]
+
+
+def test_newcomers_come_behind_others_and_each_address_has_its_turn() -> None:
+    """SPEC P642: the first views of two hundred seats of one stranger lay before the frames of those who draw."""
+    held = Held()
+    lane = held.lane("room")
+
+    def work(name: str, milliseconds: int) -> None:
+        held.log.append(name)
+        time.sleep(milliseconds / 1000)
+
+    for k in range(20):
+        lane.behind("stranger", work, f"s{k}", 12)
+    for k in range(4):
+        lane.behind("pupil", work, f"p{k}", 1)
+    for k in range(40):
+        lane.submit(work, f"m{k}", 3)
+    done = held.done()
+    assert [name for name in done if name[0] == "m"] == [f"m{k}" for k in range(40)]
+    assert sum(name[0] == "s" for name in done[: done.index("m39")]) <= 6, "a quarter of the time, not of the turns"
+    assert done.index("p3") <= done.index("s5"), "of newcomers each address has its turn"
+    assert len(done) == 64
+
+
+def test_newcomers_have_all_turns_where_nobody_else_has_work() -> None:
+    """SPEC P642."""
+    held = Held()
+    for k in range(3):
+        held.thread.behind("me", held.log.append, f"n{k}")
+    assert held.done() == ["n0", "n1", "n2"]
+
+
+def test_what_newcomers_wait_for_may_be_dropped() -> None:
+    """SPEC P642."""
+    held = Held()
+    waiting = held.thread.behind("me", print)
+    held.thread.shutdown(wait=False, cancel_futures=True)
+    held.done()
+    with pytest.raises(CancelledError):
+        waiting.result(60)
 
 
 def test_who_had_a_turn_longest_ago_is_next_and_only_so_many_are_remembered() -> None:

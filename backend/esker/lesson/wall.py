@@ -13,7 +13,7 @@ import time
 from collections import Counter
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 from pydantic import ValidationError
@@ -24,7 +24,7 @@ from esker.errors import Cannot, EskerError
 from esker.fairness.shares import Full, Places, Share, Who
 from esker.fairness.spending import Accounts
 from esker.lesson.classes import Classes
-from esker.session.ground.feed import Stream
+from esker.session.ground.frames.stream import Stream
 from esker.session.room.core import Denied
 from esker.session.room.limits import TokenBucket
 from esker.session.room.protocol import HELLO_SECONDS
@@ -56,6 +56,7 @@ MINE, ALL = 10, 3
 class _Outlet:
     """Where frames of one copy wait (``session.ground.ports.FrameOutlet``)."""
 
+    home: str
     closing: object = None
 
     def notify(self) -> None:
@@ -75,11 +76,11 @@ class _Copy:
     names: tuple[str, ...]
     frozen: bool
     settings: c.TerrainSettings
+    outlet: _Outlet
     seen: c.TerrainSettings | None = None
     """The settings that ``settings`` was made of last."""
     room: Room | None = None
     stream: Stream | None = None
-    outlet: _Outlet = field(default_factory=_Outlet)
     top: int = c.WALL_LEVEL
     fresh: bool = True
     next_at: float = 0.0
@@ -268,7 +269,7 @@ class WallSession:
             copy = self._copies.get(found.number)
             if copy is None:
                 settings = (self._start or c.TerrainSettings()).model_copy(update=LEFT_OUT)
-                copy = _Copy(found.number, found.terrain, (), found.frozen, settings)
+                copy = _Copy(found.number, found.terrain, (), found.frozen, settings, _Outlet(self._who.home))
                 self._copies[found.number] = copy
             copy.names, copy.frozen = tuple(names.get(found.number, ())), found.frozen
             if copy.clock < 0:
@@ -287,7 +288,7 @@ class WallSession:
             if top > copy.top:
                 copy.drawn = False  # it is looked at closely: if nobody has it open, it is opened for that
             self._leave(copy)
-            copy.top, copy.outlet = top, _Outlet()
+            copy.top, copy.outlet = top, _Outlet(self._who.home)
             if room is not None:
                 copy.room, copy.stream, copy.fresh = room, room.watch(copy.outlet, top), True
                 copy.quiet_since = now

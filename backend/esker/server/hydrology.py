@@ -17,7 +17,7 @@ from esker import grid
 from esker.flow.reaches import UNITS_PER_CELL, Reaches, find_reaches
 from esker.flow.rivers import water_of
 from esker.process import priority
-from esker.session.ground.tilethread import Lane, TileThread
+from esker.session.ground.frames.tilethread import Lane, TileThread
 from esker.session.rivers import Pace
 from esker.synthesis.detailed import DetailedTerrain, site_of
 from esker.tiles.channels import values

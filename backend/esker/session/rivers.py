@@ -41,7 +41,7 @@ FOLLOWED: Final = ("rivers", "sea_level_m", "seed", "look", "detail", "rule", "p
 
 
 class Ground(Protocol):
-    """Where the ground is read and frames are sent (``ground.feed.TileFeed``)."""
+    """Where the ground is read and frames are sent (``ground.frames.feed.TileFeed``)."""
 
     def snapshot(self, level: int, taken: Callable[[Any], None]) -> None:
         """Reads the ground once the tile thread has nothing else to do; ``taken`` is called in the loop, with None

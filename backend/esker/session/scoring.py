@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.process import priority
-from esker.session.ground.tilethread import Lane, TileThread
+from esker.session.ground.frames.tilethread import Lane, TileThread
 from esker.tasks.score import Points, score
 
 log = logging.getLogger("esker.tasks")

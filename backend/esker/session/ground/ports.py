@@ -13,7 +13,7 @@ from esker import contract as c
 from esker.contract import CloseCode
 from esker.events import BaseLevel, SolveEvent
 from esker.grid import TileKey
-from esker.session.ground.tilethread import Lane
+from esker.session.ground.frames.tilethread import Lane
 from esker.tiles.delivery import RefinedTile
 
 
@@ -23,6 +23,11 @@ class FrameOutlet(Protocol):
     @property
     def closing(self) -> object:
         """None while frames may be sent; else the reason why not."""
+        ...
+
+    @property
+    def home(self) -> str:
+        """What the client's address counts as (``fairness.shares.homes``); empty where it has none."""
         ...
 
     def notify(self) -> None:

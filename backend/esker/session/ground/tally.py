@@ -64,11 +64,13 @@ class Used:
 class Home:
     """Time of the solver that all rooms of one home had.
 
-    time: is compared with that of other homes; least: the least seconds of its rooms
-    that were busy at the last choice."""
+    time: is compared with that of other homes; least: the least seconds of its rooms that were busy at the last choice.
+    turn: number of the last slice of any of its rooms; began: of the slice at which the last solve of any began."""
 
     time: Time = field(default_factory=Time)
     least: float = 0.0
+    turn: int = 0
+    began: int = 0
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,13 @@ class Tally(Generic[Room]):
     def noted(self, room: Room, **what: Any) -> Tally[Room]:
         """Returns the tally with something else noted of one room."""
         return replace(self, rooms={**self.rooms, room: replace(self.rooms[room], **what)})
+
+    def served(self, room: Room, *, begins: bool) -> Tally[Room]:
+        """Notes that a room has the present turn. ``begins``: whether its newest solve begins by it."""
+        key = self.home_of(room)
+        home = self.homes[key]
+        now = replace(home, turn=self.turns, began=self.turns if begins else home.began)
+        return replace(self, homes={**self.homes, key: now})
 
     def opened(self, room: Room, home: Hashable = None) -> Tally[Room]:
         """Returns the tally with a room that comes."""
@@ -170,7 +179,7 @@ class Tally(Generic[Room]):
             if had.time.is_busy != (room in waiting)
         }
         homes = {
-            key: Home(home.time.levelled(key in there, least), within[key])
+            key: replace(home, time=home.time.levelled(key in there, least), least=within[key])
             for key, home in self.homes.items()
             if home.time.is_busy != (key in there) or within[key] != home.least
         }

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import contract as c
-from esker.session.ground.feed import Stream, TileFeed
+from esker.session.ground.frames.feed import TileFeed
+from esker.session.ground.frames.stream import Stream
 from esker.session.ground.ports import FrameOutlet
 from esker.session.progress import GroundProgress
 from esker.session.room.core import RoomCore

@@ -18,8 +18,8 @@ from esker.fairness.shares import Full, Share, Who
 from esker.fairness.turns import SERVER, FairThreads
 from esker.process import memory
 from esker.session.births import Births, born_as
+from esker.session.ground.frames.tilethread import TileThread
 from esker.session.ground.ports import Elevation, Tiles
-from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Worker
 from esker.session.room.conducting import Desk
 from esker.session.room.core import Denied, RoomCore, RoomInfo

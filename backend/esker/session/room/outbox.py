@@ -100,6 +100,11 @@ class Outbox:
         self.ticket = ""
         """By which who is closed may be let in later."""
 
+    @property
+    def home(self) -> str:
+        """What the client's address counts as; empty where nobody asked by one."""
+        return self._who.home
+
     def belongs(self, link: str) -> None:
         """Says by which link the client came in."""
         self._waiting.count(self._who, -self._waits)

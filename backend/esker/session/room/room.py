@@ -18,9 +18,10 @@ from esker.document.ops import Refusal
 from esker.document.revisions import revision
 from esker.fairness.shares import Who
 from esker.session.ground.base_builder import Layers
-from esker.session.ground.feed import Stream, TileFeed
+from esker.session.ground.frames.feed import TileFeed
+from esker.session.ground.frames.stream import Stream
+from esker.session.ground.frames.tilethread import TileThread
 from esker.session.ground.ports import Elevation, ScoredTiles, Tiles, WateredTiles
-from esker.session.ground.tilethread import TileThread
 from esker.session.ground.worker import Job, Worker
 from esker.session.lesson.classroom import FROZEN, ClassRoom
 from esker.session.progress import GroundProgress

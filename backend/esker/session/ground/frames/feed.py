@@ -2,7 +2,8 @@
 
 All work on tiles (taking a level, planning, encoding) happens in one thread of its own, so the event loop never waits
 for it and no lock is needed. A client is planned for only while its byte window is open and its last frames have been
-handed to the socket: versions in between are skipped by construction, and no more than ``BATCH_BYTES`` are ever queued.
+handed to the socket: versions in between are skipped by construction, and no more than ``stream.BATCH_BYTES`` are ever
+queued.
 
 A coarsest preview of newer strokes may come at any time. What is coarser and newer bars finer levels, so it waits until
 the frames of a finest preview that has just come were made.
@@ -16,11 +17,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
-from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -29,16 +28,15 @@ from numpy.typing import NDArray
 from esker import contract as c
 from esker.events import Level, Preview
 from esker.grid import TileKey
+from esker.session.ground.frames.stream import Stream
+from esker.session.ground.frames.tilethread import Lane, TileThread
 from esker.session.ground.ports import ClientTiles, FrameOutlet, Tiles, WateredTiles
-from esker.session.ground.tilethread import Lane, TileThread
 from esker.tiles.delivery import RefinedTile
 
 log = logging.getLogger("esker.feed")
 
 PUTS_AHEAD: Final = 1
 """Levels that may wait to become tiles while the solver goes on."""
-BATCH_BYTES: Final = 48 << 10
-"""Frames of one client are made in one go up to this size: each hand-over to the loop and back costs a millisecond."""
 BATCH_SECONDS: Final = 0.03
 """Refined tiles that come within this time are taken together."""
 BATCH_TILES: Final = 16
@@ -49,28 +47,6 @@ FORGET_SECONDS: Final = 1.0
 """Earlier states of levels are let go so long after something was taken or sent: by then clients have the newest."""
 REQUESTS_SECONDS: Final = 0.05
 """While cameras move, requests are worked out at most this often."""
-
-
-@dataclass(eq=False)
-class Stream:
-    """The tiles of one client: its window, and the encoded frames that wait for the socket."""
-
-    outbox: FrameOutlet
-    top: int | None = None
-    """The finest level of somebody who only watches, None: of a client with a view."""
-    view: c.View | None = None
-    in_flight: int = 0
-    hungry: bool = True
-    busy: bool = False
-    rivers: bytes | None = None
-    """The newest frame of rivers, until it is sent: behind all tiles."""
-    frames: deque[bytes] = field(default_factory=deque)
-
-    @property
-    def ready(self) -> bool:
-        """Whether a frame may be made for this client now."""
-        free = not self.frames and not self.busy and self.in_flight < c.BYTE_WINDOW
-        return self.hungry and free and self.outbox.closing is None
 
 
 class TileFeed:
@@ -127,6 +103,7 @@ class TileFeed:
 
     def remove(self, stream: Stream) -> None:
         """Forgets a client that left."""
+        stream.gone = True
         self._streams.discard(stream)
         self._submit(self._forget, stream)
 
@@ -137,7 +114,7 @@ class TileFeed:
 
     def credit(self, stream: Stream, count: int) -> None:
         """Takes note that a client has applied so many bytes."""
-        stream.in_flight = max(0, stream.in_flight - count)
+        stream.credit(count)
         self._feed(stream)
 
     def heights(self, level: int) -> Future[NDArray[np.float32] | None]:
@@ -335,6 +312,8 @@ class TileFeed:
     def _make(self, stream: Stream, view: c.View | None, most: int) -> None:
         """Makes frames of the latest state, up to ``most`` bytes and the rest of a frame; hands each over when made."""
         made = 0
+        if stream.gone:
+            return
         try:
             tiles = self._clients.get(stream)
             if tiles is None:
@@ -392,21 +371,24 @@ class TileFeed:
         stream.busy, stream.hungry = True, False
         if view is not None and self._refines and self._requests_timer is None:
             self._requests_timer = self._loop.call_later(REQUESTS_SECONDS, self._requests_due)
-        most = min(BATCH_BYTES, c.BYTE_WINDOW - stream.in_flight)
-        if not self._submit(self._make, stream, view, most):
+        behind = stream.outbox.home if stream.newcomer else None
+        if not self._submit(self._make, stream, view, stream.most, behind=behind):
             self._streams.discard(stream)
 
     def _requests_due(self) -> None:
         self._requests_timer = None
         self._submit(self._publish, False)
 
-    def _submit(self, work: Callable[..., None], *args: object) -> bool:
-        """Has the tile thread do something.
+    def _submit(self, work: Callable[..., None], *args: object, behind: str | None = None) -> bool:
+        """Has the tile thread do something; with ``behind``, as a newcomer's who counts as that.
 
         Returns False when the thread has been shut down: the server is stopping.
         """
         try:
-            self._executor.submit(work, *args)
+            if behind is None:
+                self._executor.submit(work, *args)
+            else:
+                self._executor.behind(behind, work, *args)
         except RuntimeError:
             return False
         return True
@@ -419,6 +401,7 @@ class TileFeed:
     def _all_made(self, stream: Stream, some: bool) -> None:
         stream.busy = False
         stream.hungry |= some
+        stream.seen |= not some
         if some:
             self._forget_soon()
         if not stream.hungry and stream.rivers is not None:
