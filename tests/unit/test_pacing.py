@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from esker.fairness.shares import Who
-from esker.fairness.spending import PAYS
+from esker.fairness.spending import MUCH, PACE, PAYS, USUAL_SECONDS, Pace
 from esker.fairness.turns import FairThreads
 from esker.server.wire import pacing
 from esker.server.wire.pacing import Paced, _Metered
@@ -69,6 +69,39 @@ def test_a_request_that_need_not_wait_long_waits(monkeypatch: pytest.MonkeyPatch
     assert _status(paced, "192.0.2.7") == 200
     assert len(waits) == 1
     assert 0 < waits[0] <= pacing.PATIENCE_SECONDS
+
+
+def test_requests_of_who_asks_for_much_come_one_after_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P644: sixteen requests at a time of one address lay before each tile of those who draw."""
+    waits: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        waits.append(seconds)
+
+    monkeypatch.setattr(asyncio, "sleep", sleep)
+    paced = Paced(_app)
+    for _ in range(5):
+        assert _status(paced, "192.0.2.7") == 200
+    assert waits == [], "whoever opens a page waits for nothing"
+    (purse,) = paced._accounts.asker("192.0.2.7")
+    purse.pay(time.monotonic(), purse.left * (1.01 - MUCH))
+    for _ in range(5):
+        assert _status(paced, "192.0.2.7") == 200
+    assert len(waits) == 5
+    assert max(waits) < 0.1
+    assert _status(paced, "192.0.2.8") == 200
+    assert len(waits) == 5
+
+
+def test_requests_at_once_wait_for_each_other() -> None:
+    """SPEC P644: what each costs is known when it is done, which is too late for those that came with it."""
+    pace = Pace()
+    waits = [pace.begin(10.0) for _ in range(4)]
+    assert [wait for wait, _ in waits] == pytest.approx([k * USUAL_SECONDS / PACE.per_second for k in range(4)])
+    for _, counted in waits:
+        pace.end(10.0, counted, 0.01)
+    assert pace.begin(10.0)[0] == pytest.approx(0.04 / PACE.per_second)
+    assert pace.begin(12.0)[0] == 0.0
 
 
 @pytest.mark.usefixtures("ticks")

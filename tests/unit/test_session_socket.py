@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import random
+import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any
 
@@ -132,6 +133,37 @@ class Call:
 async def settle() -> None:
     for _ in range(12):
         await asyncio.sleep(0)
+
+
+def test_who_sends_what_takes_long_leaves_turns_to_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P645: whatever came with a hello, and all behind it, was taken in one go: nobody else had a turn."""
+    took, rests = iter((0.0, 0.001, 0.0, 0.05) * 3), list[float]()
+    monkeypatch.setattr(time, "thread_time", lambda: next(took, 0.0))
+    sleep = asyncio.sleep
+
+    async def rest(seconds: float) -> None:
+        rests.append(seconds)
+        await sleep(0)
+
+    monkeypatch.setattr("esker.session.room.socket.asyncio.sleep", rest)
+
+    async def run() -> None:
+        call = Call()
+        for message in (
+            c.Hello(protocol=c.PROTOCOL_VERSION, terrain="t", secret="s", client="ada"),
+            *[c.Ping(t=1.0)] * 3,
+        ):
+            call.incoming.put_nowait(message.model_dump_json())
+        others = 0
+        while len(call.hall.events) < 3:
+            await sleep(0)
+            others += 1
+        assert others >= 4
+        monkeypatch.undo()
+        await call.end()
+
+    asyncio.run(run())
+    assert [seconds for seconds in rests if 0 < seconds < 0.1] == [0.05, 0.05]
 
 
 @pytest.mark.parametrize("seed", range(20))

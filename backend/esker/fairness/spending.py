@@ -27,6 +27,13 @@ MEMBERS: Final = Rate(0.6, 3.0)
 """Processor time of all connections of one address together that were let in."""
 ASKERS: Final = Rate(0.25, 3.0)
 """Processor time of all requests of one address: thirty people behind one who open the page at once take a second."""
+MUCH: Final = 0.85
+"""Requests of an address that has less than this share of its purse left come one after another, at ``PACE``."""
+PACE: Final = Rate(0.35, 0.0)
+"""Processor time of the requests of one address that has asked for much: a rest follows each, in which others have
+their turns."""
+USUAL_SECONDS: Final = 0.001
+"""What a request costs, before anything is known of those of its address."""
 NETWORK: Final = 3.0
 """An IPv6 /48 has so many times the processor time of an address."""
 BYTE_SECONDS: Final = 1e-8
@@ -64,6 +71,31 @@ class Purse:
         return self.left / self._rate.burst
 
 
+class Pace:
+    """The pace at which requests of one address follow each other.
+
+    What a request costs is known when it is done, and many may be asked at once: each is counted as usual ones cost
+    when it begins, so that the next waits for it.
+    """
+
+    __slots__ = ("_purse", "_usual")
+
+    def __init__(self) -> None:
+        self._purse, self._usual = Purse(PACE), USUAL_SECONDS
+
+    def begin(self, now: float) -> tuple[float, float]:
+        """Counts a request. Returns the seconds that it waits for those before it, and what it was counted as."""
+        self._purse.pay(now, 0.0)
+        wait, counted = self._purse.debt, self._usual
+        self._purse.pay(now, counted)
+        return wait, counted
+
+    def end(self, now: float, counted: float, seconds: float) -> None:
+        """Corrects what a request was counted as by what it took."""
+        self._usual += (seconds - self._usual) / 8
+        self._purse.pay(now, seconds - counted)
+
+
 @dataclass(frozen=True)
 class _Kind:
     own: Rate
@@ -93,6 +125,7 @@ class Accounts:
 
     def __init__(self, most_keys: int = MOST_KEYS) -> None:
         self._purses: OrderedDict[tuple[str, str, _Kind], Purse] = OrderedDict()
+        self._paces: OrderedDict[str, Pace] = OrderedDict()
         self._most = most_keys
 
     def stranger(self, address: str) -> Account:
@@ -106,6 +139,14 @@ class Accounts:
     def asker(self, address: str) -> tuple[Purse, ...]:
         """Returns the purses out of which a request of this address is paid."""
         return tuple(self._purse(place, key, _ASKER) for place, key in Who(address).counted())
+
+    def pace(self, address: str) -> Pace:
+        """Returns the pace of the requests of this address."""
+        home = Who(address).home
+        pace = self._paces[home] = self._paces.pop(home) if home in self._paces else Pace()
+        while len(self._paces) > self._most:
+            self._paces.popitem(last=False)
+        return pace
 
     def _open(self, address: str, kind: _Kind) -> Account:
         return Account(tuple(self._purse(place, key, kind) for place, key in Who(address).counted()), kind)

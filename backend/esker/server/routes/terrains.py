@@ -110,7 +110,7 @@ async def _taken_in(request: Request, grids: GridStore, uploads: Turns) -> c.Doc
     except archive.ArchiveError as error:
         raise Cannot(400, "bad_archive", str(error)) from error
     finally:
-        grids.drop(work)
+        await asyncio.to_thread(grids.drop, work)
 
 
 def _new_document(body: NewTerrain) -> c.Document:

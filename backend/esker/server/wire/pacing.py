@@ -1,7 +1,9 @@
 """Requests are paced by the processor time that they take, as ASGI middleware (SPEC P451).
 
 What a request takes of the event loop is taken from whoever draws. It is measured step by step and paid by the address,
-and a request of an address that has spent its share waits until it has some again. What a request asks for does not
+and a request of an address that has spent its share waits until it has some again. Long before that, requests of an
+address that has asked for much come one after another, with rests in between: the event loop takes what waits in the
+order in which it came, and a dozen requests at once lie before every tile on its way. What a request asks for does not
 count: a page that is not there costs about as much as one that is.
 """
 
@@ -12,7 +14,7 @@ import time
 from collections.abc import Callable, Coroutine, Generator
 from typing import Any, Final
 
-from esker.fairness.spending import PAYS, Accounts, Purse
+from esker.fairness.spending import MUCH, PAYS, Accounts, Purse
 from esker.server.routes.answers import answer
 
 REQUEST_SECONDS: Final = 0.0003
@@ -34,15 +36,20 @@ class Paced:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        purses = self._accounts.asker(scope["client"][0] if scope.get("client") else "")
+        caller = scope["client"][0] if scope.get("client") else ""
+        purses, pace = self._accounts.asker(caller), self._accounts.pace(caller)
+        took = 0.0
 
         def pay(seconds: float) -> None:
+            nonlocal took
+            took += seconds
             now = time.monotonic()
             for purse in purses:
                 purse.pay(now, seconds)
 
         pay(REQUEST_SECONDS)
-        wait = _debt(purses)
+        turn, counted = pace.begin(time.monotonic())
+        wait = max(_debt(purses), turn if any(purse.share < MUCH for purse in purses) else 0.0)
         if wait > 0:
             await asyncio.sleep(min(wait, PATIENCE_SECONDS))
         if wait > PATIENCE_SECONDS:
@@ -59,6 +66,7 @@ class Paced:
             await _Metered(self.app(scope, receive, paced), pay)
         finally:
             PAYS.reset(token)
+            pace.end(time.monotonic(), counted, took)
 
 
 def _debt(purses: tuple[Purse, ...]) -> float:

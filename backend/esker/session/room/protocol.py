@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from esker import contract as c
 from esker.contract import CloseCode, RejectCode
@@ -207,8 +208,8 @@ class Connection:
         if events is not None:
             return events
         if not self._greeted:
-            return self._close("bad_hello", f"The hello cannot be read: {_sentence(error)}")
-        return self._close("malformed", f"The message cannot be read: {_sentence(error)}")
+            return self._close("bad_hello", f"The hello cannot be read: {_sentence(error.errors()[0])}")
+        return self._close("malformed", f"The message cannot be read: {_sentence(error.errors()[0])}")
 
     def _salvage(self, text: str, now: float) -> list[Event] | None:
         try:
@@ -226,11 +227,12 @@ class Connection:
             try:
                 good.append(c.OpEnvelope.model_validate_json(json.dumps(item)))
             except ValidationError as error:
-                if any(e["loc"][:1] != ("op",) for e in error.errors()) or not isinstance(item, dict):
+                details = error.errors(include_url=False, include_context=False, include_input=False)
+                if any(e["loc"][:1] != ("op",) for e in details) or not isinstance(item, dict):
                     return None
                 if not self._ops.take(now) and self._refuses(1):
                     return events + self._close("rate_limited", "Far too many changes a second that cannot be read.")
-                events.append(Refused(item["id"], _reject_code(error), _sentence(error)))
+                events.append(Refused(item["id"], _reject_code(details[0]), _sentence(details[0])))
         return self._rated(tuple(good), events, now)
 
     def _close(self, code: CloseCode, message: str) -> list[Event]:
@@ -238,8 +240,7 @@ class Connection:
         return [Close(code, message)]
 
 
-def _reject_code(error: ValidationError) -> RejectCode:
-    first = error.errors()[0]
+def _reject_code(first: ErrorDetails) -> RejectCode:
     where = first["loc"][-1] if first["loc"] else ""
     if first["type"] == "too_long" and where in ("points", "curve"):
         return "too_many_points"
@@ -248,8 +249,7 @@ def _reject_code(error: ValidationError) -> RejectCode:
     return "malformed"
 
 
-def _sentence(error: ValidationError) -> str:
-    first = error.errors()[0]
+def _sentence(first: ErrorDetails) -> str:
     # The name of a field that does not exist comes from the client, and this sentence goes into the log.
     where = ascii(".".join(str(part) for part in first["loc"])[:MAX_NAME])[1:-1]
     return f"{where}: {first['msg']}." if where else f"{first['msg']}."

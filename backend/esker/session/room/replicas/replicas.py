@@ -46,6 +46,8 @@ class Replicas:
             self._viewing.loaded(row.clock, row.op)
         self._kept: dict[bool, tuple[int, bytes]] = {}
         """Encoded documents with their clocks. The key says whether they are as links to look are shown them."""
+        self._weighed = (-1, 0)
+        """The clock at which the points of the document were counted last, and how many there were."""
         self._unsigned: tuple[int, bytes] | None = None
         """The encoded document without the names of people who drew, with its clock."""
 
@@ -61,9 +63,14 @@ class Replicas:
 
     def ready(self, document: StrokeSet, clock: int | None, view: bool = False, asked: int | None = None) -> bool:
         """Returns whether who has seen ``clock`` (None: nothing) can be welcomed without encoding a heavy document."""
-        if self._missed(document, clock, view) is not None or points_of(document) <= HEAVY_POINTS:
+        if self._missed(document, clock, view) is not None or not self._is_heavy(document):
             return True
         return self._usable(document, view, asked=asked) is not None
+
+    def _is_heavy(self, document: StrokeSet) -> bool:
+        if self._weighed[0] != document.clock:
+            self._weighed = document.clock, points_of(document)
+        return self._weighed[1] > HEAVY_POINTS
 
     def keep(self, clock: int, body: bytes, view: bool = False) -> None:
         """Takes the document of a clock that was encoded elsewhere. ``view``: as a link to look is shown it."""
