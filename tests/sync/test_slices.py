@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import time
+import weakref
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -124,6 +126,23 @@ def test_at_rest_what_is_wanted_is_refined_once_and_asked_for_again(refining: An
     viewer.keys = (B, A, C)
     worker.nudge(client)
     wait(lambda: (7, C) in viewer.got)
+
+
+def test_the_thread_that_waits_knows_no_room_that_left(refining: Any) -> None:
+    """SPEC S594: the loop's own variable kept the room that left last, with all of its ground."""
+    _, worker, _, _ = refining
+    viewer = Viewer((A,))
+    client = worker.add(1, ignore, ignore, viewer)
+    worker.request(client, Job(7, (), SETTINGS))
+    wait(lambda: viewer.got)
+    left = weakref.ref(client)
+    worker.remove(client)
+    del client
+    deadline = time.monotonic() + 5
+    while left() is not None:
+        assert time.monotonic() < deadline
+        gc.collect()
+        time.sleep(0.01)
 
 
 def test_a_new_job_ends_refinement_at_once_and_it_starts_again_from_the_new_ground(refining: Any) -> None:

@@ -162,15 +162,23 @@ class Worker:
                         break
                 if self._stopping:
                     break
-                leaving, self._leaving = self._leaving, []
-            for gone in leaving:  # a solve must end in the thread that began it
-                gone.work.drop()
+            self._let_go()
             self._repairs.retry()
             self._tidy(idle=client is None)
-            if client is not None and client not in leaving:
-                self._step(client)
+            if client is not None:
+                self._step(client)  # one that left meanwhile has no slice
         for left in self._rooms():
             left.work.drop()
+
+    def _let_go(self) -> None:
+        """Ends the solves of rooms that left, which must happen in the thread that began them.
+
+        Nothing here may know such a room afterwards: while this thread waits, that would keep all of its ground.
+        """
+        with self._changed:
+            leaving, self._leaving = self._leaving, []
+        for gone in leaving:
+            gone.work.drop()
 
     def _rooms(self) -> list[Client]:
         return list(self._grounds)
