@@ -86,7 +86,7 @@ def test_german_fits_in_windows_of_three_widths(visitors: Visitors, server: Serv
     assert visitor.js("() => document.documentElement.lang") == "en"
 
 
-def test_a_hint_lies_on_no_bar(visitors: Visitors, server: Server) -> None:
+def test_a_hint_lies_on_no_bar_and_bars_not_on_each_other(visitors: Visitors, server: Server) -> None:
     """SPEC U690: with the widest inspector, that of whoever leads in German."""
     terrain, secret = server.create(title="Leer")
     visitor = visitors(1100, 700, locale="de-DE", reduced_motion="reduce")
@@ -108,4 +108,6 @@ def test_a_hint_lies_on_no_bar(visitors: Visitors, server: Server) -> None:
                     hint = box(visitor, "esk-terrain .hint")
                     on = [bar for bar in bars if not apart(hint, box(visitor, bar))]
                     assert on == [], (width, height, legend, closed, hint)
+                    status, view = box(visitor, "esk-status-line"), box(visitor, "esk-view-bar")
+                    assert apart(status, view), (width, height, status, view)
     assert visitor.errors == []

@@ -112,12 +112,11 @@ export class EskStatusLine extends SignalElement {
           padding: 0 9px;
           font-size: 0.6875rem;
         }
-        .renderer {
-          display: none;
-        }
       }
+      /* In German the buttons of the view leave no more than this. */
       @media (max-width: 900px) {
-        .place {
+        .place,
+        .renderer {
           display: none;
         }
       }
