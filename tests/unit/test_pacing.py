@@ -93,6 +93,26 @@ def test_requests_of_who_asks_for_much_come_one_after_another(monkeypatch: pytes
     assert len(waits) == 5
 
 
+def test_what_threads_do_for_a_request_and_whoever_is_refused_hold_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P644: the pace is one of the event loop. A teacher's export of a minute is no reason for pupils to wait."""
+
+    async def works(scope: Any, receive: Any, send: Any) -> None:
+        pays = PAYS.get()
+        assert pays is not None
+        pays(1.0)
+        await _app(scope, receive, send)
+
+    paced = Paced(works)
+    assert _status(paced, "192.0.2.7") == 200
+    assert paced._accounts.pace("192.0.2.7").begin(time.monotonic())[0] < 0.1
+    (purse,) = paced._accounts.asker("192.0.2.8")
+    purse.pay(time.monotonic(), 1e9)
+    monkeypatch.setattr(pacing, "PATIENCE_SECONDS", 0.0)
+    for _ in range(1000):
+        assert _status(paced, "192.0.2.8") == 429
+    assert paced._accounts.pace("192.0.2.8").begin(time.monotonic())[0] < 500 * USUAL_SECONDS / PACE.per_second
+
+
 def test_requests_at_once_wait_for_each_other() -> None:
     """SPEC P644: what each costs is known when it is done, which is too late for those that came with it."""
     pace = Pace()

@@ -99,7 +99,7 @@ def test_a_newcomer_waits_behind_until_the_first_view_is_whole() -> None:
             while feed.sent(stream):
                 await asyncio.sleep(0)
             await asyncio.sleep(0)
-        assert stream.seen
+        assert stream.whole
         assert stream.newcomer, "nothing of it was applied"
         assert not later.newcomers
         feed.credit(stream, stream.in_flight)
@@ -121,6 +121,19 @@ def test_whoever_applies_half_a_window_is_no_newcomer_and_claims_count_only_as_f
     for _ in range(2):
         stream.in_flight += SEEN_BYTES // 2
         stream.credit(SEEN_BYTES // 2)
+    assert not stream.newcomer
+
+
+def test_whoever_has_applied_all_before_it_is_known_to_be_all_is_no_newcomer() -> None:
+    """SPEC P642: a client that is quicker than the server had its first stroke behind others."""
+    stream = Stream(Outlet())
+    stream.made(False)
+    assert stream.newcomer, "there was no ground yet"
+    stream.in_flight = 100
+    stream.made(True)
+    stream.credit(100)
+    assert stream.newcomer
+    stream.made(False)
     assert not stream.newcomer
 
 

@@ -21,6 +21,7 @@ from esker.tiles.codec.frame import FrameHead, TileRecord, ratio, write_frame
 from esker.tiles.codec.payload import Ints, Wide, child_window, cost, predict
 
 CACHE_BYTES: Final = 16 << 20
+"""A room's cache of coded tiles: with small tiles, which only seem to take nothing, what 32 MiB of payloads were."""
 
 DIFFERENCES: Final = (Filter.ROW, Filter.PLANE)
 

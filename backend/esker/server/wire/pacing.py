@@ -23,6 +23,7 @@ PATIENCE_SECONDS: Final = 10.0
 """A request that would wait for longer is refused then."""
 PAUSE_SECONDS: Final = 0.25
 """The longest pause between two parts of an answer."""
+_Pay = Callable[[float], None]
 TOO_MUCH: Final = "Too much was asked for from your address. Wait a moment."
 
 
@@ -38,24 +39,32 @@ class Paced:
             return
         caller = scope["client"][0] if scope.get("client") else ""
         purses, pace = self._accounts.asker(caller), self._accounts.pace(caller)
-        took = 0.0
+        took = REQUEST_SECONDS
 
         def pay(seconds: float) -> None:
-            nonlocal took
-            took += seconds
             now = time.monotonic()
             for purse in purses:
                 purse.pay(now, seconds)
 
+        def step(seconds: float) -> None:  # of the event loop: threads that work for a request hold no other one up
+            nonlocal took
+            took += seconds
+            pay(seconds)
+
         pay(REQUEST_SECONDS)
         turn, counted = pace.begin(time.monotonic())
         wait = max(_debt(purses), turn if any(purse.share < MUCH for purse in purses) else 0.0)
-        if wait > 0:
-            await asyncio.sleep(min(wait, PATIENCE_SECONDS))
-        if wait > PATIENCE_SECONDS:
-            await answer(429, "rate_limited", TOO_MUCH, again=int(wait))(scope, receive, send)
-            return
+        try:
+            if wait > 0:
+                await asyncio.sleep(min(wait, PATIENCE_SECONDS))
+            if wait > PATIENCE_SECONDS:
+                await answer(429, "rate_limited", TOO_MUCH, again=int(wait))(scope, receive, send)
+            else:
+                await self._run(scope, receive, send, purses, pay, step)
+        finally:
+            pace.end(time.monotonic(), counted, took)
 
+    async def _run(self, scope: Any, receive: Any, send: Any, purses: tuple[Purse, ...], pay: _Pay, step: _Pay) -> None:
         async def paced(message: Any) -> None:
             await send(message)
             if message.get("more_body") and (behind := _debt(purses)) > 0:
@@ -63,10 +72,9 @@ class Paced:
 
         token = PAYS.set(pay)
         try:
-            await _Metered(self.app(scope, receive, paced), pay)
+            await _Metered(self.app(scope, receive, paced), step)
         finally:
             PAYS.reset(token)
-            pace.end(time.monotonic(), counted, took)
 
 
 def _debt(purses: tuple[Purse, ...]) -> float:

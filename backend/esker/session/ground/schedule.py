@@ -8,7 +8,7 @@ share and no more. Idle time is not saved up: a room that comes back begins leve
 address share what one or two rooms have (``tally.py``).
 
 A lower class that has waited for ``PATIENCE`` gets a slice all the same, the solve that was begun first, so nothing
-starves. Within a class homes have turns first, then the rooms of one. A solve in progress holds
+starves. For coarse previews and refinement homes have turns first, then the rooms of one. A solve in progress holds
 memory, so only so many may be in progress as fit the budget: a room that waits for its coarse preview ends the settling
 solve that began last, which starts again later.
 
@@ -106,7 +106,7 @@ def begin(
     ground = grounds[room]
     tally = replace(tally, turns=tally.turns + 1)
     time = replace(tally.rooms[room].time, is_coarsest=_is_coarsest(states.stage(ground, now), ground))
-    tally = tally.noted(room, turn=tally.turns, ran_at=now, time=time).served(room, begins=False)
+    tally = tally.noted(room, turn=tally.turns, ran_at=now, time=time).served(room)
     may = not ground.channels.making or _may_begin(room, COARSE, grounds, now, tally, _solving(grounds))
     if not states.starts(ground, now) or not may:
         return False, (), tally
@@ -119,7 +119,7 @@ def begin(
         wanted, begun = ground.jobs.wanted, ground.jobs.begun
         spared = spared and wanted is not None and begun is not None and wanted.job.number == begun.job.number
     began = tally.rooms[room].began if states.is_overtaken(ground) else tally.turns  # it has waited long enough
-    return True, gone, tally.noted(room, began=began, is_spared=spared).served(room, begins=True)
+    return True, gone, tally.noted(room, began=began, is_spared=spared)
 
 
 def has_something_else(room: Room, grounds: Grounds[Room]) -> bool:
@@ -131,16 +131,17 @@ def has_something_else(room: Room, grounds: Grounds[Room]) -> bool:
     )
 
 
-def _order(stage: int, ground: Ground, room: Room, tally: Tally[Room]) -> tuple[int, ...]:
+def _order(stage: int, ground: Ground, room: Room, tally: Tally[Room]) -> tuple[int, int]:
     """Returns a key by which rooms of one class are ordered: the least comes first.
 
-    What was begun is finished before the next one of its class, since a room amid a solve holds memory. Before rooms
-    have their turns their homes have: else whoever is there waits once for each of sixty rooms that somebody opens.
+    What was begun is finished before the next one of its class, since a room amid a solve holds memory. Where a slice
+    is all that a room waits for, homes have turns before rooms have: else whoever is there waits once for each of
+    sixty rooms that somebody opens.
     """
-    had, home = tally.rooms[room], tally.homes[tally.home_of(room)]
-    if stage not in (FINER, SETTLE):
-        return home.turn, had.turn
-    return (ground.top, 0, had.began) if states.is_solving(ground) else (ground.top, 1, home.began, had.began)
+    had = tally.rooms[room]
+    if stage in (FINER, SETTLE):
+        return ground.top, had.began
+    return tally.homes[tally.home_of(room)].turn, had.turn
 
 
 # --- memory ---------------------------------------------------------------------------------------------------------

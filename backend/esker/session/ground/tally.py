@@ -65,12 +65,11 @@ class Home:
     """Time of the solver that all rooms of one home had.
 
     time: is compared with that of other homes; least: the least seconds of its rooms that were busy at the last choice.
-    turn: number of the last slice of any of its rooms; began: of the slice at which the last solve of any began."""
+    turn: number of the last slice of any of its rooms."""
 
     time: Time = field(default_factory=Time)
     least: float = 0.0
     turn: int = 0
-    began: int = 0
 
 
 @dataclass(frozen=True)
@@ -104,12 +103,10 @@ class Tally(Generic[Room]):
         """Returns the tally with something else noted of one room."""
         return replace(self, rooms={**self.rooms, room: replace(self.rooms[room], **what)})
 
-    def served(self, room: Room, *, begins: bool) -> Tally[Room]:
-        """Notes that a room has the present turn. ``begins``: whether its newest solve begins by it."""
+    def served(self, room: Room) -> Tally[Room]:
+        """Notes that a room has the present turn."""
         key = self.home_of(room)
-        home = self.homes[key]
-        now = replace(home, turn=self.turns, began=self.turns if begins else home.began)
-        return replace(self, homes={**self.homes, key: now})
+        return replace(self, homes={**self.homes, key: replace(self.homes[key], turn=self.turns)})
 
     def opened(self, room: Room, home: Hashable = None) -> Tally[Room]:
         """Returns the tally with a room that comes."""

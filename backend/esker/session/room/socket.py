@@ -26,9 +26,9 @@ GOODBYE_SECONDS: Final = 0.8
 BROKE: Final = "This connection asked for more work than people's drawing takes."
 SILENT: Final = "The server's database does not answer at the moment. Your page comes back by itself."
 REASON_BYTES: Final = 123
+"""Most bytes that a close frame holds for its reason (RFC 6455, 5.5)."""
 LONG_SECONDS: Final = 0.002
 """A message that took longer is followed by a rest of the same length."""
-"""Most bytes that a close frame holds for its reason (RFC 6455, 5.5)."""
 
 
 class Transport(Protocol):

@@ -399,9 +399,7 @@ class TileFeed:
         stream.outbox.notify()
 
     def _all_made(self, stream: Stream, some: bool) -> None:
-        stream.busy = False
-        stream.hungry |= some
-        stream.seen |= not some
+        stream.made(some)
         if some:
             self._forget_soon()
         if not stream.hungry and stream.rivers is not None:

@@ -32,7 +32,7 @@ class Stream:
     busy: bool = False
     newcomer: bool = True
     """Whether the client has not applied a first whole view: its frames come behind those of others (SPEC P642)."""
-    seen: bool = False
+    whole: bool = False
     """Whether a whole view was made for it once."""
     gone: bool = False
     """Whether the client left. What waits to be made for it is not made. The tile thread reads it."""
@@ -56,4 +56,16 @@ class Stream:
         count = min(count, self.in_flight)
         self.in_flight -= count
         self.applied += count
-        self.newcomer &= self.applied < SEEN_BYTES and not (self.seen and self.in_flight == 0)
+        self._arrive()
+
+    def made(self, some: bool) -> None:
+        """Takes note that frames were made, or with ``some`` False that there was nothing more to make."""
+        self.busy = False
+        self.hungry |= some
+        # In a room without ground there is nothing to make, and nothing was seen.
+        self.whole |= not some and self.in_flight + self.applied > 0
+        self._arrive()
+
+    def _arrive(self) -> None:
+        has_all = self.whole and self.in_flight == 0
+        self.newcomer &= not has_all and self.applied < SEEN_BYTES

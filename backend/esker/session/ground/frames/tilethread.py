@@ -57,10 +57,11 @@ class TileThread(Executor):
     def __init__(
         self,
         name: str = "tiles",
+        now: Callable[[], float] = time.monotonic,
         begin: Callable[[], object] = lambda: None,
     ) -> None:
         """``begin``: called first in the thread."""
-        self._begin = begin
+        self._now, self._begin = now, begin
         self._changed = threading.Condition()
         self._lanes: dict[Lane, None] = {}
         """Lanes that have work. They, and what follows, need the lock."""
@@ -131,14 +132,14 @@ class TileThread(Executor):
         self._begin()
         while (work := self._next()) is not None:
             future, call = work
-            began = time.monotonic()
+            began = self._now()
             if not future.set_running_or_notify_cancel():
                 continue
             try:
                 future.set_result(call())
             except BaseException as error:
                 future.set_exception(error)
-            self._took(time.monotonic() - began)
+            self._took(self._now() - began)
             del work, future, call
 
     def _next(self) -> _Work | None:
