@@ -41,7 +41,7 @@ test: ## set up, then run every check and every test
 # What failed is run once more. A test that passes then depends on what else the machine did: it is a defect of the test, and
 # the output names it, but it says nothing against the change. What is wrong fails twice.
 NICE := $(shell command -v nice >/dev/null && echo nice -n 10)
-told = trap 'echo "Part $(1): $$SECONDS s."' EXIT
+told = trap 'echo "Part $(1): $$SECONDS s; processor time, of the shell and of what it ran:"; times' EXIT
 tested = $(call told,$(1)); $(3) $(BIN)/python -m pytest --durations=12 -o cache_dir=.pytest_cache/$(1) $(2) || { echo "Once more, what failed:"; \
   $(3) $(BIN)/python -m pytest -o cache_dir=.pytest_cache/$(1) --last-failed --last-failed-no-failures=none $(2); }
 

@@ -10,7 +10,6 @@ time from nothing until everything that the server's selection wants is made.
 from __future__ import annotations
 
 import argparse
-import gc
 import itertools
 import json
 import math
@@ -27,7 +26,7 @@ from esker import grid
 from esker.contract import DEFAULT_SIZE_M, MAX_REFINED_LEVEL, Document, Stroke, TerrainSettings, View
 from esker.events import Done
 from esker.grid import TileKey
-from esker.server.run import GARBAGE_OBJECTS
+from esker.process.garbage import Collector
 from esker.solve.constraints.crest import crest_of
 from esker.solve.refine.refinement import Refiner
 from esker.solve.solver import Basis, Solver
@@ -279,9 +278,7 @@ def views(scene: str, low: int, runs: int) -> dict[str, Any]:
 def as_a_server() -> None:
     """Sets the collector as a server does (``run.Assembly.run``): it never looks at what is there now. Else it stops
     one view in four for 100 ms, and now and then a step."""
-    gc.collect()
-    gc.freeze()
-    gc.set_threshold(GARBAGE_OBJECTS)
+    Collector().begin()
 
 
 def run(solver: Solver, quick: bool) -> dict[str, Any]:

@@ -70,7 +70,7 @@ async def life(data: Path, first: int) -> None:
         tiles=_NoTiles(),
         executor=TileThread(),
         info=RoomInfo(0, 0, "none"),
-        on_empty=lambda: None,
+        on_empty=lambda _: None,
     )
     wake = asyncio.Event()
     outbox = Outbox(wake.set)

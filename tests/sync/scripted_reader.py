@@ -15,7 +15,7 @@ from esker import contract as c
 from esker.contract import ImportStage
 from esker.importing.refusal import ImportRefused
 from esker.patchwork.raster import rasters
-from tests.sync.harness import LiveServer
+from tests.sync.harness import PATIENCE, LiveServer
 
 QUESTION = c.ImportQuestion(id="size", text="How wide is it?", default="fit")
 GRID = np.add.outer(np.arange(40.0), np.arange(50.0))
@@ -129,3 +129,18 @@ def layers(server: LiveServer, terrain: str) -> tuple[c.Layer, ...]:
 def works(server: LiveServer) -> list[str]:
     """Names of the work folders that are there."""
     return [p.name for p in (server.assembly.settings.data / "grids").iterdir() if p.name.startswith(".work")]
+
+
+def nothing_left(grids: Path, start: str = "") -> bool:
+    """Whether nothing (whose name starts so) is left in the folder of grids, soon: a thread removes it."""
+    deadline = time.monotonic() + PATIENCE
+    while any(p.name.startswith(start) for p in grids.iterdir()):
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def no_works(server: LiveServer) -> bool:
+    """Whether no work folder is left, soon."""
+    return nothing_left(server.assembly.settings.data / "grids", ".work")

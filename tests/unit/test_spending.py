@@ -12,7 +12,20 @@ from typing import Any
 import pytest
 
 from esker import contract as c
-from esker.fairness.spending import DOUBT, MEMBER, MEMBERS, NETWORK, STRANGER, STRANGERS, Account, Accounts, Purse
+from esker.fairness.spending import (
+    DOUBT,
+    MEMBER,
+    MEMBERS,
+    MUCH,
+    NETWORK,
+    STRAINED_PRICE,
+    STRAINED_REST,
+    STRANGER,
+    STRANGERS,
+    Account,
+    Accounts,
+    Purse,
+)
 from esker.server.wire import websocket
 from esker.session.room import protocol
 from tests.unit.test_websocket import Wire, settle
@@ -133,9 +146,45 @@ def test_messages_that_take_long_end_the_connection_and_no_more_of_it_is_read(mo
         wire.server.listen(slow)
         for _ in range(200):
             wire.server.data_received(text_frame("x"))
+            rested(wire)
         assert broke == [True]
-        assert len(heard) == pytest.approx(MEMBER.burst / 0.012, abs=2)
+        calm, strained = (1 - MUCH) * MEMBER.burst, MUCH * MEMBER.burst
+        assert len(heard) == pytest.approx(calm / 0.012 + strained / (0.012 * STRAINED_PRICE), abs=2)
         wire.transport.pause_reading.assert_called()
+        wire.server.connection_lost(None)
+
+    asyncio.run(run())
+
+
+def rested(wire: Wire) -> float:
+    """Ends the rest that the connection has, if it has one; returns how long it was to be."""
+    turn = wire.server._turn
+    if turn is None:
+        return 0.0
+    turn.cancel()
+    wire.server._go_on()
+    return turn.when() - asyncio.get_running_loop().time()
+
+
+def test_a_connection_that_has_taken_much_rests_longer_and_after_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P647: a thousand pings at a time, each with an answer, took every second turn of the event loop."""
+
+    async def run() -> None:
+        clock = Clock(monkeypatch)
+        wire, _, broke = await _member()
+
+        def slow(_: str | bytes) -> None:
+            clock.used += 0.003
+
+        wire.server.listen(slow)
+        rests = []
+        while not broke:
+            wire.server.data_received(text_frame("x") * 2)
+            rests.append(rested(wire))
+        calm = int((1 - MUCH) * MEMBER.burst / 0.006)
+        assert all(rest <= 0.006 for rest in rests[: calm - 1]), "somebody who draws much, or comes again"
+        strained = [rest for rest in rests[calm + 1 : -1] if rest > 0]
+        assert min(strained) == pytest.approx(0.003 * STRAINED_REST, abs=0.002), "a message in a turn"
         wire.server.connection_lost(None)
 
     asyncio.run(run())

@@ -15,6 +15,7 @@ from esker.document.ops import StrokeSet
 from esker.document.wire import document_json
 from esker.fairness import shares
 from esker.fairness.shares import Share, Who
+from esker.fairness.turns import Turnstile
 from esker.process import memory
 from esker.server.routes import socket as route
 from esker.session.room import hub, openrooms
@@ -152,7 +153,7 @@ def test_a_long_text_arrives_whole_from_its_parts() -> None:
         wire.take()
         parts = ("é".encode() * 7, "ü".encode() * route.FRAGMENT_BYTES, b'"}')
         went_on = Mock()
-        await route.WireTransport(Mock(scope=wire.scope)).send_long(parts, went_on)
+        await route.WireTransport(Mock(scope=wire.scope, client=None), Turnstile()).send_long(parts, went_on)
         frames: Any = wire.take()
         assert b"".join(bytes(frame.data) for frame in frames) == b"".join(parts)
         assert [frame.fin for frame in frames] == [False] * (len(frames) - 1) + [True]

@@ -15,6 +15,7 @@ from websockets.frames import Frame
 from websockets.http11 import Response
 from websockets.uri import parse_uri
 
+from esker.fairness.turns import Turnstile
 from esker.server.routes import socket as route
 from esker.server.wire.websocket import READ_AHEAD, WebSocketProtocol
 
@@ -66,7 +67,7 @@ def test_a_frame_made_once_arrives_as_a_text_and_not_after_the_end() -> None:
         for size in (0, 125, 126, 65_535, 65_536, route.SHARED_CHARACTERS + 1):
             text = "é" * size
             went_on = Mock()
-            await route.WireTransport(Mock(scope=wire.scope)).send_text(text, went_on)
+            await route.WireTransport(Mock(scope=wire.scope, client=None), Turnstile()).send_text(text, went_on)
             frames = wire.take()
             assert all(isinstance(frame, Frame) for frame in frames)
             assert b"".join(bytes(frame.data) for frame in frames).decode() == text

@@ -13,6 +13,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from esker.fairness.shares import MOST_KEYS, Rate, Who
@@ -28,10 +29,16 @@ MEMBERS: Final = Rate(0.6, 3.0)
 ASKERS: Final = Rate(0.25, 3.0)
 """Processor time of all requests of one address: thirty people behind one who open the page at once take a second."""
 MUCH: Final = 0.85
-"""Requests of an address that has less than this share of its purse left come one after another, at ``PACE``."""
-PACE: Final = Rate(0.35, 0.0)
-"""Processor time of the requests of one address that has asked for much: a rest follows each, in which others have
-their turns."""
+"""An address that has less than this share of its purse left is served at ``PACE``, its requests one after another; and
+a connection that has less of its own is read with longer rests."""
+STRAINED_REST: Final = 4.0
+"""A connection that has less than ``MUCH`` of its own purse left rests so many times as long as it takes."""
+STRAINED_PRICE: Final = 2.0
+"""It pays for a part of these rests too, else its purse would fill up as fast and it would never end."""
+PACE: Final = Rate(0.2, 0.0)
+"""Processor time of the requests of one address that has asked for much, and of its connections together where they
+have taken much: a rest follows each, in which others have their turns."""
+LONGEST_REST: Final = 0.5
 USUAL_SECONDS: Final = 0.001
 """What a request costs, before anything is known of those of its address."""
 NETWORK: Final = 3.0
@@ -108,8 +115,34 @@ _STRANGER, _MEMBER, _ASKER = _Kind(STRANGER, STRANGERS), _Kind(MEMBER, MEMBERS),
 class Account:
     """The purse of one connection, with those that it shares."""
 
-    def __init__(self, shared: tuple[Purse, ...] = (), kind: _Kind = _STRANGER) -> None:
-        self._own, self._shared = Purse(kind.own), shared
+    def __init__(
+        self, shared: tuple[Purse, ...] = (), kind: _Kind = _STRANGER, pace: Callable[[], Purse] = lambda: Purse(PACE)
+    ) -> None:
+        """``pace``: of all connections of the address."""
+        self._own, self._shared, self._pace = Purse(kind.own), shared, pace
+
+    @property
+    def is_strained(self) -> bool:
+        """Whether the connection has taken more than people's drawing does, or those of its address together have,
+        though not so much that it has to end."""
+        return self._own.share < MUCH or self._is_crowded
+
+    @property
+    def _is_crowded(self) -> bool:
+        return any(purse.share < MUCH for purse in self._shared)
+
+    def price(self, seconds: float) -> float:
+        """Returns what the connection has to pay for so many seconds."""
+        return seconds * STRAINED_PRICE if self._own.share < MUCH else seconds
+
+    def rest(self, now: float, seconds: float) -> float:
+        """Returns for how long the connection rests after it took so many seconds."""
+        rest = seconds * STRAINED_REST if self._own.share < MUCH else seconds
+        if self._is_crowded:
+            pace = self._pace()
+            pace.pay(now, seconds)
+            rest = max(rest, pace.debt)
+        return min(rest, LONGEST_REST)
 
     def pay(self, now: float, seconds: float) -> bool:
         """Pays; False when the connection has to end."""
@@ -126,6 +159,8 @@ class Accounts:
     def __init__(self, most_keys: int = MOST_KEYS) -> None:
         self._purses: OrderedDict[tuple[str, str, _Kind], Purse] = OrderedDict()
         self._paces: OrderedDict[str, Pace] = OrderedDict()
+        self._crowds: OrderedDict[str, Purse] = OrderedDict()
+        """Paces of the connections of an address."""
         self._most = most_keys
 
     def stranger(self, address: str) -> Account:
@@ -149,7 +184,15 @@ class Accounts:
         return pace
 
     def _open(self, address: str, kind: _Kind) -> Account:
-        return Account(tuple(self._purse(place, key, kind) for place, key in Who(address).counted()), kind)
+        shared = tuple(self._purse(place, key, kind) for place, key in Who(address).counted())
+        return Account(shared, kind, partial(self._crowd, Who(address).home))
+
+    def _crowd(self, home: str) -> Purse:
+        """The pace at which the connections of an address are read, where they have taken much."""
+        pace = self._crowds[home] = self._crowds.pop(home) if home in self._crowds else Purse(PACE)
+        while len(self._crowds) > self._most:
+            self._crowds.popitem(last=False)
+        return pace
 
     def _purse(self, place: str, key: str, kind: _Kind) -> Purse:
         times = NETWORK if place == "network" else 1.0

@@ -53,6 +53,43 @@ class Turns:
                 found.set_result(None)
 
 
+class Turnstile:
+    """Work in the event loop itself, one piece after another, addresses in turns. Lives in one event loop.
+
+    A piece is followed by a rest as long as it took, in which the loop does what else there is: two hundred people who
+    have waited for the same thing would else be let in by one turn of it.
+    """
+
+    def __init__(self) -> None:
+        self._line: Line[asyncio.Future[None]] = Line(1)
+
+    async def run(self, who: Who, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Returns what ``work``, which waits for nothing, returns or raises."""
+        loop = asyncio.get_running_loop()
+        key, mine, spent = who.site, loop.create_future(), 0.0
+        self._line.join(key, mine)
+        self._serve()
+        try:
+            await mine
+            began = time.thread_time()
+            try:
+                return work(*args, **kwargs)
+            finally:
+                spent = time.thread_time() - began
+        finally:
+            if not self._line.leave(key, mine):
+                loop.call_later(spent, self._rested, key)
+
+    def _rested(self, key: str) -> None:
+        self._line.done(key)
+        self._serve()
+
+    def _serve(self) -> None:
+        while (found := self._line.next()) is not None:
+            if not found.done():  # see ``Turns``
+                found.set_result(None)
+
+
 class FairThreads:
     """Threads for work that blocks. One address has at most half of them at a time, in turns with the others."""
 

@@ -419,7 +419,8 @@ class Imports:
             room.importing(c.Importing(author=self._author(job), file=job.file, status=status))
 
     def _end(self, job: Job, stage: ImportStage, text: str) -> None:
-        self._grids.drop(job.work)
+        # In a thread: what was unpacked is hundreds of megabytes at worst.
+        asyncio.get_running_loop().run_in_executor(None, self._grids.drop, job.work)
         job.place.release()
         self._at(job, stage, 1.0 if stage == "done" else job.share, text)
         job.ended = self._now()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import logging
 import socket
 import ssl
@@ -24,6 +23,7 @@ from esker.jobs.exports import Exports, Plant
 from esker.keeper.lesson import first_code, greeting, open_lesson
 from esker.keeper.private import Key, Private
 from esker.process import confinement, system
+from esker.process.garbage import Collector
 from esker.render.pictures.previews import Previews
 from esker.server import first_build
 from esker.server.app import create_app
@@ -78,9 +78,8 @@ SWITCH_SECONDS: Final = 0.0002
 """An append passes four threads on its way to the screen; at each Python would let the other go on for 5 ms first."""
 
 
-GARBAGE_OBJECTS: Final = 10_000
-"""Objects made before the collector looks at them. It never looks at what is there at the start, modules and compiled
-code, which made all threads wait for 100 ms now and then."""
+TEND_TICKS: Final = 50
+"""Ticks of the HTTP server, ten a second, after which the collector may take its time where there is little to do."""
 
 
 FLAWS: Final = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
@@ -123,6 +122,7 @@ class _Server(uvicorn.Server):
         super().__init__(config)
         self._node = node
         self._hub, self._imports, self._host, self._announce = hub, imports, host, started
+        self.collector = Collector()
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         if self._node is not None:
@@ -142,6 +142,11 @@ class _Server(uvicorn.Server):
         make: Any = self.config.http_protocol_class
         made: asyncio.Protocol = make(config=self.config, server_state=self.server_state, app_state=self.lifespan.state)
         return made
+
+    async def on_tick(self, counter: int) -> bool:
+        if counter % TEND_TICKS == 0:
+            self.collector.tend()
+        return await super().on_tick(counter)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         if self._node is not None:
@@ -317,17 +322,18 @@ class Assembly:
         """Serves until the server is told to stop."""
         self._server = server
         sys.setswitchinterval(SWITCH_SECONDS)
-        gc.collect()
-        gc.freeze()
+        server.collector.begin()
         system.give_memory_back()  # compiling took memory that is free now
-        gc.set_threshold(GARBAGE_OBJECTS)
         if self._care is not None:
             self._care.start()
         if threading.current_thread() is threading.main_thread():
             # The HTTP server raises the signal that stopped it once more when it is done; by then it has been obeyed.
             # A signal that comes before the server listens to signals itself is obeyed too.
             system.on_stop(lambda *_: setattr(server, "should_exit", True))
-        server.run(sockets=[self._listener])
+        try:
+            server.run(sockets=[self._listener])
+        finally:
+            server.collector.end()
 
     def _lost(self) -> None:
         """Another server has the database."""

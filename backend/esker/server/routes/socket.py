@@ -16,6 +16,7 @@ from esker import contract as c
 from esker.cluster.node import Cluster
 from esker.fairness.shares import Full, Places, Share, Who
 from esker.fairness.spending import Account, Accounts
+from esker.fairness.turns import Turnstile
 from esker.server.routes.answers import address
 from esker.server.routes.elsewhere import Arrival
 from esker.server.wire.front import Front
@@ -62,11 +63,18 @@ def _fragments(parts: Sequence[bytes]) -> Iterator[bytes]:
 _framed = lru_cache(SHARED_TEXTS)(_frame)
 
 
+def _write(wire: WebSocketProtocol, fragment: bytes, others: Iterator[bytes]) -> bytes | None:
+    """Writes a fragment if there is room for it. Returns what is to be written next: the same one where there was none,
+    None after the last."""
+    return next(others, None) if wire.write_now(fragment) else fragment
+
+
 class WireTransport:
     """``session.room.socket.Transport`` over Starlette's websocket."""
 
-    def __init__(self, socket: WebSocket) -> None:
-        self._socket = socket
+    def __init__(self, socket: WebSocket, long: Turnstile) -> None:
+        """``long``: lets through what all sockets send of long texts, a fragment at a time."""
+        self._socket, self._long, self._who = socket, long, Who(address(socket))
         self._wire: WebSocketProtocol | None = socket.scope.get("esker.socket")
 
     def listen(self, listener: Callable[[str | bytes], None]) -> None:
@@ -90,9 +98,14 @@ class WireTransport:
         if self._wire is None:
             await self._send({"type": "websocket.send", "text": b"".join(parts).decode()})
             return
-        for fragment in _fragments(parts):
-            await self._wire.write(fragment)
-            went_on()
+        fragments = _fragments(parts)
+        fragment = next(fragments, None)
+        while fragment is not None:
+            await self._wire.writable.wait()
+            following = await self._long.run(self._who, _write, self._wire, fragment, fragments)
+            if following is not fragment:
+                went_on()
+            fragment = following
 
     async def send_bytes(self, data: bytes) -> None:
         await self._send({"type": "websocket.send", "bytes": data})
@@ -128,12 +141,12 @@ async def messages(socket: WebSocket) -> AsyncIterator[str | bytes]:
         yield text if text is not None else data or b""
 
 
-async def accepted(socket: WebSocket, front: Front) -> tuple[WireTransport, str | None, bool]:
+async def accepted(socket: WebSocket, front: Front, long: Turnstile) -> tuple[WireTransport, str | None, bool]:
     """Answers the handshake. Returns the transport, the subprotocol, and whether the page comes from here."""
     offered = socket.scope.get("subprotocols", [])
     subprotocol = c.SUBPROTOCOL if c.SUBPROTOCOL in offered else None
     await socket.accept(subprotocol)
-    transport = WireTransport(socket)
+    transport = WireTransport(socket, long)
     against = front.against(socket.scope)
     if against is not None:
         await refuse(socket, transport, "bad_origin", against[2])
@@ -142,15 +155,14 @@ async def accepted(socket: WebSocket, front: Front) -> tuple[WireTransport, str 
 
 def add_socket(app: FastAPI, hub: Hub, front: Front, cluster: Cluster | None = None) -> None:
     """Adds the route. ``cluster``: where other servers may have the terrain."""
-    accounts = Accounts()
-    sockets = Places(SOCKETS)
+    accounts, sockets, long = Accounts(), Places(SOCKETS), Turnstile()
 
     @app.websocket("/ws")
     async def ws(socket: WebSocket) -> None:
         arrival = None if cluster is None else Arrival(cluster, socket)
         if arrival is not None and not await arrival.expected():
             return
-        transport, subprotocol, is_welcome = await accepted(socket, front)
+        transport, subprotocol, is_welcome = await accepted(socket, front, long)
         if not is_welcome:
             return
         try:

@@ -6,6 +6,7 @@ from fastapi import FastAPI, WebSocket
 
 from esker.cluster.node import Cluster
 from esker.fairness.spending import Accounts
+from esker.fairness.turns import Turnstile
 from esker.lesson.classes import Classes
 from esker.lesson.wall import Walls, WallSession
 from esker.server.routes.answers import address
@@ -16,14 +17,14 @@ from esker.server.wire.front import Front
 
 def add_wall(app: FastAPI, classes: Classes, front: Front, cluster: Cluster | None = None) -> None:
     """Adds it. ``cluster``: where other servers may have the class."""
-    walls, accounts = Walls(classes), Accounts()
+    walls, accounts, long = Walls(classes), Accounts(), Turnstile()
 
     @app.websocket("/ws/wall")
     async def wall(socket: WebSocket) -> None:
         arrival = None if cluster is None else Arrival(cluster, socket)
         if arrival is not None and not await arrival.expected():
             return
-        transport, subprotocol, is_welcome = await accepted(socket, front)
+        transport, subprotocol, is_welcome = await accepted(socket, front, long)
         if not is_welcome:
             return
 

@@ -35,8 +35,9 @@ FAREWELL_SECONDS: Final = 1.0
 """Seconds that a peer which does not answer has for reading the farewell."""
 SLICE_BYTES: Final = 4096
 """Bytes that are parsed at a time. They are few, since small frames cost a hundred times what their bytes do."""
-TURN_SECONDS: Final = 0.004
-"""A connection that took so much processor time without a pause waits as long before more of it is read."""
+TURN_SECONDS, STRAINED_TURN_SECONDS = 0.004, 0.002
+"""A connection that took so much processor time without a pause waits as long before more of it is read. One that has
+taken much waits sooner, and longer (``spending.Account.rest``)."""
 MAX_FRAGMENTS: Final = 256
 """Frames of one message. The library bounds its bytes, and empty frames have none."""
 _NO_HANDSHAKE: Final = (
@@ -180,7 +181,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         self.pay(BYTE_SECONDS * len(data))
         if self._deaf:
             return
-        if self._rest:
+        if self._turn is not None:
             self._rest += data
             self.transport.pause_reading()
             return
@@ -189,8 +190,10 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
     def _parse(self, data: bytes) -> None:
         """Whole plain texts are understood here, all else by the library's parser, for one turn."""
         began, at, spent = time.thread_time(), 0, 0.0
-        while at < len(data) and spent < TURN_SECONDS and not self._deaf and not self.disconnected:
-            taken = self._take_texts(data, at, began)
+        is_strained = self._account is not None and self._account.is_strained
+        turn = STRAINED_TURN_SECONDS if is_strained else TURN_SECONDS
+        while at < len(data) and spent < turn and not self._deaf and not self.disconnected:
+            taken = self._take_texts(data, at, began + turn)
             if not taken:
                 taken = min(SLICE_BYTES, len(data) - at)
                 piece = data[at : at + taken] if taken < len(data) else data
@@ -200,11 +203,12 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
                     self._refuse_handshake()
             at += taken
             spent = time.thread_time() - began
-        self.pay(spent)
-        if at < len(data) and not self._deaf and not self.disconnected:
+        account = self._account or Account()
+        self.pay(account.price(spent))
+        if (at < len(data) or (is_strained and data)) and not self._deaf and not self.disconnected:
             self._rest = data[at:]
             self.transport.pause_reading()
-            self._turn = self.loop.call_later(spent, self._go_on)
+            self._turn = self.loop.call_later(account.rest(self.loop.time(), spent), self._go_on)
 
     def _refuse_handshake(self) -> None:
         """The request asked for a websocket and cannot be one: it has a body, say. The library says nothing then."""
@@ -216,7 +220,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         self._turn = None
         rest, self._rest = self._rest, b""
         self._parse(rest)
-        if not self._rest and not self._deaf and not self.read_paused and not self.transport.is_closing():
+        if self._turn is None and not self._deaf and not self.read_paused and not self.transport.is_closing():
             self.transport.resume_reading()
 
     def handle_cont(self, event: Frame) -> None:
@@ -230,8 +234,9 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             return
         super().handle_cont(event)
 
-    def _take_texts(self, data: bytes, at: int, began: float) -> int:
-        """Gives the listener the texts that ``data`` has from ``at`` on, for as long as the turn lasts that ``began``.
+    def _take_texts(self, data: bytes, at: int, until: float) -> int:
+        """Gives the listener the texts that ``data`` has from ``at`` on, ``until`` the thread's time at which its turn
+        ends.
 
         Returns how many bytes they took. Clients say nearly everything in texts that are masked and in one frame each,
         and here these take a third of the time. What is anything else is left as it is.
@@ -252,7 +257,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             at = start + size
             assert self._listener is not None
             self._listener(text)
-            if time.thread_time() - began > TURN_SECONDS:
+            if time.thread_time() > until:
                 break
         return at - first
 

@@ -77,11 +77,11 @@ class Conducting:
         desk: Desk | None,
         *,
         ordered: Callable[[], None],
-        flush: Callable[[], Awaitable[None]],
+        flush: Callable[[], Awaitable[None] | None],
         people_changed: Callable[[], None],
     ) -> None:
-        """``ordered``: called when ops were; ``flush``: waits until they are in the journal; ``people_changed``: the
-        list of members is to be told anew."""
+        """``ordered``: called when ops were; ``flush``: waits until they are in the journal, None where the room is
+        gone; ``people_changed``: the list of members is to be told anew."""
         self._core, self._journal, self._loop, self._desk = core, journal, loop, desk
         self._ordered, self._flush, self._people_changed = ordered, flush, people_changed
         self._gone: OrderedDict[str, _Gone] = OrderedDict()
@@ -297,11 +297,16 @@ class Conducting:
             return
         self._undoing = asyncio.ensure_future(self._take_back(by, people, self._desk))
 
+    async def _flushed(self) -> None:
+        waiting = self._flush()
+        if waiting is not None:
+            await waiting
+
     async def _take_back(self, by: Member, people: tuple[str, ...], desk: Desk) -> None:
         core = self._core
         here = {m.client for m in core.members if m.person in people}
         clients = sorted(core.lesson.clients_of(people) | here)
-        await self._flush()
+        await self._flushed()
         try:
             who = Who(by.address, by.link)
             deeds = await desk.read(who, lambda: read_deeds(self._journal, core.document.id, clients))
@@ -317,7 +322,7 @@ class Conducting:
         except Refusal as refusal:
             by.outbox.message(c.Notice(text=refusal.message))
         self._ordered()
-        await self._flush()
+        await self._flushed()
         names = {m.name for m in core.members if m.person in people} | {
             self._gone[each].name for each in people if each in self._gone
         }

@@ -286,9 +286,9 @@ async def _in_a_thread(work: Callable[..., Any], *arguments: Any) -> Any:
     return await asyncio.to_thread(work, *arguments)
 
 
-MakeRoom = Callable[[HistoryCore, Callable[[], None], Present | None, str], HistoryRoom]
-"""Makes the room over a core; the second is to be called when nobody is left in it, the third says what is there now,
-where only that may be shown, the last is the address for which its work is done."""
+MakeRoom = Callable[[HistoryCore, Callable[[Room], None], Present | None, str], HistoryRoom]
+"""Makes the room over a core; the second is to be called with it when nobody is left in it, the third says what is
+there now, where only that may be shown, the last is the address for which its work is done."""
 
 
 class HistoryRooms:
@@ -299,7 +299,7 @@ class HistoryRooms:
     ) -> None:
         self._journal, self._make = journal, make
         self._claims = claims or Claims()
-        self._rooms: dict[HistoryRoom, Place] = {}
+        self._rooms: dict[Room, Place] = {}
         """History rooms, each with the place that it holds."""
         self._places = Places(Share(most))
 
@@ -335,9 +335,7 @@ class HistoryRooms:
                 raise Denied("no_terrain", "There is no such terrain on this server.")
             still = None if present is None else viewing.things(await present())
             demand()
-            room = self._make(
-                HistoryCore(loaded, self._claims, still, hide), lambda: self._close(room), present, who.site
-            )
+            room = self._make(HistoryCore(loaded, self._claims, still, hide), self._close, present, who.site)
         except DamagedTerrain as error:
             place.release()
             raise Denied("server_error", "The journal of this terrain is damaged; nothing was changed.") from error
@@ -378,7 +376,7 @@ class HistoryRooms:
                 member.outbox.close(code, sentence)
             self._close(room)
 
-    def _close(self, room: HistoryRoom) -> None:
+    def _close(self, room: Room) -> None:
         place = self._rooms.pop(room, None)
         if place is not None:
             place.release()

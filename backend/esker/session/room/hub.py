@@ -15,7 +15,7 @@ from esker import contract as c
 from esker.document.ops import Limits, StrokeSet
 from esker.errors import EskerError
 from esker.fairness.shares import Full, Share, Who
-from esker.fairness.turns import SERVER, FairThreads
+from esker.fairness.turns import SERVER, FairThreads, Turnstile
 from esker.process import memory
 from esker.session.births import Births, born_as
 from esker.session.ground.frames.tilethread import TileThread
@@ -89,6 +89,7 @@ class Hub:
         self.door = Door(journal, access, self.deletion, now)
         self._rooms: dict[str, asyncio.Task[Room | None]] = {}
         self._places, self._memory = OpenRooms(self.sleep, rooms, self._rest), ClosedRooms()
+        self._turnstile = Turnstile()
         self._tile_thread = TileThread()
         self._elevation, self._tenancy, self._meter = elevation, tenancy, meter
         self._base_threads = ThreadPoolExecutor(1, thread_name_prefix="elevation")
@@ -120,9 +121,8 @@ class Hub:
         """Lets a client into its room, opening it if need be. Raises Denied."""
         if self._closing:
             raise Denied("shutting_down", "The server is stopping. Your page will come back by itself.")
-        link = self.door.authorise(hello.terrain, hello.secret, address)
+        link = await self._turnstile.run(Who(address), self._called, hello, address)
         who = Who(address, link.id)
-        self.door.count(who, history=hello.at is not None)
         if hello.at is not None:
             present = partial(self.strokes, hello.terrain, None, who) if link.role == "view" else None
             read = partial(self.read, who)
@@ -134,10 +134,24 @@ class Hub:
         while True:
             room = await self.room(hello.terrain, who)
             asked = await room.prepare(hello.clock, partial(self.read, who), link.role == "view")
-            if not room.closed:  # a room is closed where its last member left meanwhile
-                break
+            guest = await self._turnstile.run(who, self._joined, room, hello, link, outbox, address, asked)
+            if guest is not None:
+                return room, guest
+
+    def _called(self, hello: c.Hello, address: str) -> Link:
+        """Returns the link by which somebody comes, who counts from now on. Raises Denied."""
+        link = self.door.authorise(hello.terrain, hello.secret, address)
+        self.door.count(Who(address, link.id), history=hello.at is not None)
+        return link
+
+    def _joined(
+        self, room: Room, hello: c.Hello, link: Link, outbox: Outbox, address: str, asked: int | None
+    ) -> Guest | None:
+        """Lets somebody into an open room; None where it was closed, as its last member had left. Raises Denied."""
+        if room.closed:
+            return None
         self.door.demand(link)  # the link may have been revoked while the room was being opened
-        return room, room.join(hello, link.role, link.id, outbox, address, asked)
+        return room.join(hello, link.role, link.id, outbox, address, asked)
 
     # --- rooms --------------------------------------------------------------------------------------------------
 
@@ -204,7 +218,7 @@ class Hub:
         desk = Desk(self.read, partial(self._end_code_link, terrain))
         more = {"tenancy": self._tenancy, "on_lost": lambda: self.lose(terrain)}
         needs = self._needs() | {"desk": desk, "home": who.site} | more
-        room = Room(core, journal=self.journal, on_empty=lambda: self._empty(terrain), **needs)
+        room = Room(core, journal=self.journal, on_empty=lambda _: self._empty(terrain), **needs)
         room.in_class = self.class_of(terrain)
         return room
 
@@ -220,7 +234,7 @@ class Hub:
         )
 
     def _history_room(
-        self, core: HistoryCore, on_empty: Callable[[], None], present: Present | None = None, home: str = ""
+        self, core: HistoryCore, on_empty: Callable[[Room], None], present: Present | None = None, home: str = ""
     ) -> HistoryRoom:
         more = {"idle_seconds": c.HISTORY_IDLE_SECONDS, "present": present, "home": home} | self._needs()
         return HistoryRoom(core, journal=self.journal, on_empty=on_empty, **more)

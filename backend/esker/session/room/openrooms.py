@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 from collections.abc import Callable
 from typing import Final
 
@@ -79,7 +78,7 @@ class OpenRooms:
 
 
 class ClosedRooms:
-    """The memory of rooms that were closed. Lives in one event loop."""
+    """The memory of rooms that were closed, which are freed when nobody holds them. Lives in one event loop."""
 
     def __init__(self) -> None:
         self._timer: asyncio.TimerHandle | None = None
@@ -91,5 +90,4 @@ class ClosedRooms:
 
     def _give_back(self) -> None:
         self._timer = None
-        gc.collect()
         asyncio.get_running_loop().run_in_executor(None, system.give_memory_back)

@@ -82,7 +82,7 @@ class Outbox:
         self,
         wake: Callable[[], None],
         limit: int = c.MAX_BACKLOG_BYTES,
-        now: Callable[[Sequence[str]], bool] | None = None,
+        now: Callable[[Sequence[str]], bool | None] | None = None,
         waiting: Waiting | None = None,
         who: Who = NOBODY,
     ) -> None:

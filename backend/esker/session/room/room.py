@@ -1,7 +1,8 @@
 """The room: one open terrain, the only owner of its document, members and tiles (DESIGN 8).
 
 Everything here runs in the event loop's thread; the journal's writer, the solver and the tile thread call back into
-it. ``core.py`` holds the rules; this file holds the timers.
+it. ``core.py`` holds the rules; this file holds the timers. A room holds its parts and they know it weakly, so that its
+ground is freed the moment that nobody holds the room.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Iterable
 from concurrent.futures import Executor, Future
+from functools import partial
 from typing import Final
 
 from esker import contract as c
@@ -17,6 +19,7 @@ from esker.contract import Role
 from esker.document.ops import Refusal
 from esker.document.revisions import revision
 from esker.fairness.shares import Who
+from esker.process.garbage import weakly
 from esker.session.ground.base_builder import Layers
 from esker.session.ground.frames.feed import TileFeed
 from esker.session.ground.frames.stream import Stream
@@ -68,7 +71,7 @@ class Room(ClassRoom):
         tiles: Tiles,
         executor: TileThread,
         info: RoomInfo,
-        on_empty: Callable[[], None],
+        on_empty: Callable[[Room], None],
         elevation: Elevation | None = None,
         base_threads: Executor | None = None,
         desk: Desk | None = None,
@@ -88,13 +91,20 @@ class Room(ClassRoom):
         self._home, self._lane = home, executor.lane()
         self._lane.home = home or None
         self._feed = TileFeed(
-            tiles, size_m, info.levels, info.finest, self._lane, self._loop, self._level_taken, self._requests_changed
+            tiles,
+            size_m,
+            info.levels,
+            info.finest,
+            self._lane,
+            self._loop,
+            weakly(self._level_taken),
+            weakly(self._requests_changed),
         )
         refinement = self._feed if info.finest > info.levels else None
         self._solve_client = worker.add(
             info.levels,
             self._feed.put,
-            self._solve_failed,
+            weakly(self._solve_failed),
             refinement,
             limit=self._feed.limit,
             confirm=self._feed.confirm,
@@ -106,9 +116,10 @@ class Room(ClassRoom):
         self._rivers.works_for(home)
         scorer = tiles.scorer if isinstance(tiles, ScoredTiles) else None
         scored = min(c.TASK_LEVEL, info.levels)
-        self.scoring = Scoring(scorer, lambda: self._feed.heights(scored), self._loop, self._tell_score)
+        self.scoring = Scoring(scorer, partial(self._feed.heights, scored), self._loop, weakly(self._tell_score))
         self.scoring.works_for(home)
-        self._layers = Layers(elevation, base_threads, self._loop, self._laid, self._tell, self._slow_changed)
+        listeners = weakly(self._laid), weakly(self._tell), weakly(self._slow_changed)
+        self._layers = Layers(elevation, base_threads, self._loop, *listeners)
         self._progress = self.progress_kind(core, self._layers, info.levels, self._loop)
         self._job: Job | None = None
         """The job that was asked for last."""
@@ -130,9 +141,9 @@ class Room(ClassRoom):
             journal,
             self._loop,
             desk,
-            ordered=self._ordered,
-            flush=self.flush,
-            people_changed=self._presence_soon,
+            ordered=weakly(self._ordered),
+            flush=weakly(self.flush),
+            people_changed=weakly(self._presence_soon),
         )
         self.closed = False
         self._active_at = self._loop.time()
@@ -190,7 +201,7 @@ class Room(ClassRoom):
         self.conducting.left(guest.member)
         self._presence_soon()
         if not len(self.core.members):
-            self._on_empty()
+            self._on_empty(self)
 
     def idle_for(self, seconds: float) -> bool:
         """Returns whether nobody came or did anything for so long."""
@@ -262,7 +273,7 @@ class Room(ClassRoom):
         self._ordered()
         await self.flush()
         if not len(self.core.members):
-            self._on_empty()
+            self._on_empty(self)
         if self._journal.find(self.id, agent, 0) != clock:
             raise Refusal("unavailable", UNSAVED)
         return clock

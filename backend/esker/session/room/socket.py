@@ -11,6 +11,7 @@ from typing import Final, Protocol
 from esker import contract as c
 from esker.fairness.shares import Who
 from esker.fairness.spending import Account, Accounts
+from esker.process.garbage import weakly
 from esker.session.room import protocol
 from esker.session.room.core import Denied
 from esker.session.room.hub import Hub
@@ -92,13 +93,13 @@ class Session:
         self._protocol = protocol.Connection(now(), subprotocol)
         self._wake = asyncio.Event()
         waiting = getattr(hub, "waiting", None)
-        self.outbox = Outbox(self._woken, now=self._send_now, waiting=waiting, who=Who(address))
+        self.outbox = Outbox(weakly(self._woken), now=weakly(self._send_now), waiting=waiting, who=Who(address))
         self._end: asyncio.TimerHandle | None = None
         self._room: Room | None = None
         self._guest: Guest | None = None
         self._sending_since: float | None = None
         self._has_said_farewell = False
-        transport.charge(self._accounts.stranger(address), self._broke)
+        transport.charge(self._accounts.stranger(address), weakly(self._broke))
 
     async def run(self, messages: AsyncIterator[str | bytes]) -> None:
         """Serves the connection until either side ends it. ``messages`` ends when the socket is gone."""
@@ -115,7 +116,7 @@ class Session:
             results = await asyncio.gather(sender, reader, watch, return_exceptions=True)
             if self._room is not None and self._guest is not None:
                 self._room.leave(self._guest)
-                self._guest = None  # messages that are still read belong to nobody
+            self._room = self._guest = None  # messages that are still read belong to nobody
             # What was written as a farewell may still be on its way: then the timer drops the connection.
             if self._end is not None and not self._has_said_farewell:
                 self._end.cancel()
@@ -183,8 +184,8 @@ class Session:
             return
         try:
             self._room, self._guest = await self._hub.enter(event.hello, self.outbox, self._address)
-            self._transport.charge(self._accounts.member(self._address), self._broke)
-            self._transport.listen(self._read)  # a second hello is refused, so none comes this way
+            self._transport.charge(self._accounts.member(self._address), weakly(self._broke))
+            self._transport.listen(weakly(self._read))  # a second hello is refused, so none comes this way
         except Denied as denied:
             self.outbox.close(denied.code, denied.message, denied.ticket)
 

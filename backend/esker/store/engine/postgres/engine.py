@@ -118,23 +118,26 @@ class Postgres:
         return self._readers.answers
 
     def _write_all(self) -> None:
-        while True:
-            item = self._queue.get()
-            if item is None:
-                return
-            batch, stop = [item], False
-            while len(batch) < GROUP_LIMIT:
-                try:
-                    more = self._queue.get_nowait()
-                except queue.Empty:
-                    break
-                if more is None:
-                    stop = True
-                    break
-                batch.append(more)
-            self._commit([item for item in batch if item.future.set_running_or_notify_cancel()])
-            if stop:
-                return
+        while self._write_next():  # which holds no batch while it waits for the next, nor the rooms that wait for it
+            pass
+
+    def _write_next(self) -> bool:
+        """Commits what waits, once something does. Returns False when nothing is to be written after it."""
+        item = self._queue.get()
+        if item is None:
+            return False
+        batch, stop = [item], False
+        while len(batch) < GROUP_LIMIT:
+            try:
+                more = self._queue.get_nowait()
+            except queue.Empty:
+                break
+            if more is None:
+                stop = True
+                break
+            batch.append(more)
+        self._commit([item for item in batch if item.future.set_running_or_notify_cancel()])
+        return not stop
 
     def _commit(self, batch: list[Item]) -> None:
         """Commits a batch and resolves its futures."""
