@@ -50,14 +50,13 @@ class Processor:
         self.took: dict[str, float] = {}
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        result = yield
+    def pytest_runtest_teardown(self, item: pytest.Item) -> Iterator[None]:
         now = time.monotonic()
         if now - self.looked > RARELY_SECONDS:
             after = tree_seconds(os.getpid())
             self.took[item.nodeid] = self.took.get(item.nodeid, 0.0) + max(0.0, after - self.before)
             self.looked, self.before = now, after
-        return result
+        return (yield)  # after the last test of a browser or a server they end, and what they took is not seen any more
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         if path := os.environ.get("ESKER_TEST_PROCESSOR"):

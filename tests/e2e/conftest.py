@@ -30,9 +30,13 @@ AWAKE = ["--disable-backgrounding-occluded-windows", "--disable-renderer-backgro
 # drawing it, and it is done with each change of the page.
 UNSEEN = ["--disable-gpu-compositing"]
 
-SCALE = 0.5
+LEVEL = 3
+"""The finest level that servers of these tests solve as a whole; the product's own is one more, which is four times as
+many tiles to solve, send, unpack and draw. Two people who sketch one terrain have that (``test_together.py``)."""
+
+SCALE = 0.25
 """Drawn pixels per CSS pixel, along a side: hands, layout and errors are those of the whole window, but the software
-adapter draws a quarter of its pixels. Where the picture itself is looked at, tests ask for 1. Windows of fewer pixels
+adapter draws a sixteenth of its pixels. Where the picture itself is looked at, tests ask for 1. Windows of fewer pixels
 are not seen unless they ask for that: in their screenshots the 3D view is missing."""
 
 PATIENCE_MS = 90_000
@@ -84,6 +88,7 @@ class Server:
     port: int = field(default_factory=free_port)
     options: tuple[str, ...] = ()
     environment: dict[str, str] = field(default_factory=dict)
+    level: int = LEVEL
     process: subprocess.Popen[bytes] | None = None
 
     @property
@@ -95,7 +100,11 @@ class Server:
         command = [sys.executable, "-m", "esker", "serve", "--port", str(self.port), "--data", str(self.data)]
         with (self.data.parent / "server.log").open("ab") as log:
             self.process = subprocess.Popen(
-                [*command, *self.options], cwd=ROOT, env={**os.environ, **self.environment}, stdout=log, stderr=log
+                [*command, *self.options],
+                cwd=ROOT,
+                env=os.environ | {"ESKER_LEVEL": str(self.level)} | self.environment,
+                stdout=log,
+                stderr=log,
             )
         deadline = time.monotonic() + 300  # the first start of a machine compiles, beside whatever else it does
         while time.monotonic() < deadline:
@@ -131,11 +140,11 @@ class Server:
         return made["id"], made["secret"]
 
 
-def serving(folder: Path) -> Iterator[Server]:
+def serving(folder: Path, level: int = LEVEL) -> Iterator[Server]:
     """A fresh server on an empty data folder inside ``folder``, ended at the end: the body of a fixture."""
     if not (ROOT / "frontend" / "dist" / "index.html").exists():
         pytest.fail("The page is not built: run `make test`, which builds it first.")
-    made = Server(folder / "data")
+    made = Server(folder / "data", level=level)
     made.start()
     yield made
     made.kill(signal.SIGTERM)

@@ -10,7 +10,7 @@ from typing import Any
 
 from playwright.sync_api import Page
 
-from tests.e2e.conftest import Visitor
+from tests.e2e.conftest import LEVEL, Visitor
 
 Pixel = tuple[float, float]
 
@@ -87,7 +87,7 @@ def wait_settled(*visitors: Visitor) -> None:
             wait(visitor, "c => window.esker.clock() >= c && window.esker.settled()", max(clocks), timeout=90)
 
 
-def wait_whole(*visitors: Visitor, level: int = 4, points: Sequence[Pixel] = COARSE) -> None:
+def wait_whole(*visitors: Visitor, level: int = LEVEL, points: Sequence[Pixel] = COARSE) -> None:
     """Until every page holds a level at all of the points: at rest everybody gets everything (docs/decisions/0005).
 
     What is compared to the bit is read off the same level then, however few pixels a page draws.

@@ -9,7 +9,7 @@ from typing import Any
 from esker import contract as c
 from esker.api.terrain import Terrain
 from esker.grid import quantum, spacing
-from tests.e2e.conftest import Server, Visitor, Visitors
+from tests.e2e.conftest import LEVEL, Server, Visitor, Visitors
 from tests.e2e.hands import (
     COARSE,
     arch,
@@ -34,7 +34,7 @@ def as_it_was(visitor: Visitor, server: Server, terrain: str, secret: str, clock
     text = server.request("GET", f"/api/terrains/{terrain}/document?at={clock}", secret=secret)
     document = c.Document.model_validate_json(text)
     assert {s["id"] for s in visitor.js("() => window.esker.strokes()")} == {s.id for s in document.strokes}
-    truth, s = Terrain.from_document(document).heights(level=4), spacing(4, SIZE)
+    truth, s = Terrain.from_document(document).heights(level=LEVEL), spacing(LEVEL, SIZE)
     places = COARSE[::7]
     for (x, y), height, level in zip(places, heights(visitor, places), levels(visitor, places), strict=True):
         assert abs(height - truth[round(y / s), round(x / s)]) <= quantum(level, SIZE) + 1e-4

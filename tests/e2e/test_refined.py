@@ -13,11 +13,11 @@ from esker.api.terrain import Terrain, default_solver
 from esker.events import Done
 from esker.grid import quantum, samples, spacing
 from esker.solve.refine.refinement import Refiner
-from tests.e2e.conftest import SCALE, Server, Visitor, Visitors
+from tests.e2e.conftest import LEVEL, SCALE, Server, Visitor, Visitors
 from tests.e2e.hands import arch, draw, heights, levels, on_screen, wait, wait_settled, wait_still, wait_whole
 
 SIZE = 4096.0
-SOLVED = 4
+SOLVED = LEVEL
 Point = tuple[float, float]
 
 

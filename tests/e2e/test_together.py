@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from esker.api.terrain import Terrain
+from esker.contract import DEFAULT_LEVEL
 from esker.grid import quantum, spacing
 from tests.e2e.conftest import Server, Visitor, Visitors, serving
 from tests.e2e.hands import (
@@ -34,8 +35,8 @@ SIZE = 4096.0
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[Server]:
-    """A server that may be killed."""
-    yield from serving(tmp_path)
+    """A server that may be killed, and solves all that the product's does."""
+    yield from serving(tmp_path, DEFAULT_LEVEL)
 
 
 def two_people(visitors: Visitors, server: Server) -> tuple[Visitor, Visitor, str, str]:
@@ -50,14 +51,14 @@ def two_people(visitors: Visitors, server: Server) -> tuple[Visitor, Visitor, st
 
 def same_ground(ada: Visitor, ben: Visitor, server: Server, terrain: str, secret: str, folder: Path) -> None:
     """Both pages show the same heights exactly, and those of the offline solve within one quantisation step."""
-    wait_whole(ada, ben)
+    wait_whole(ada, ben, level=DEFAULT_LEVEL)
     here, there = heights(ada, COARSE), heights(ben, COARSE)
     assert here == there
     archive = folder / "now.esker"
     archive.write_bytes(server.request("GET", f"/api/terrains/{terrain}/archive", secret=secret))
-    truth = Terrain.load(archive).heights(level=4)
+    truth = Terrain.load(archive).heights(level=DEFAULT_LEVEL)
     held = levels(ada, COARSE)
-    s = spacing(4, SIZE)
+    s = spacing(DEFAULT_LEVEL, SIZE)
     for (x, y), height, level in zip(COARSE, here, held, strict=True):
         assert level >= 0
         assert abs(height - truth[round(y / s), round(x / s)]) <= quantum(level, SIZE) + 1e-4
