@@ -62,7 +62,8 @@ async def _compiled() -> None:
         try:
             assert process.stdout is not None
             assert process.stderr is not None
-            _, complaint = await asyncio.wait_for(asyncio.gather(process.stdout.read(), process.stderr.read()), SECONDS)
+            async with asyncio.timeout(SECONDS):
+                _, complaint = await asyncio.gather(process.stdout.read(), process.stderr.read())
         finally:
             await child_process.put_down(process)
     except (OSError, TimeoutError) as error:
