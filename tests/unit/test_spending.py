@@ -13,11 +13,13 @@ import pytest
 
 from esker import contract as c
 from esker.fairness.spending import (
+    CALM_REST,
     DOUBT,
     MEMBER,
     MEMBERS,
     MUCH,
     NETWORK,
+    PACE,
     STRAINED_PRICE,
     STRAINED_REST,
     STRANGER,
@@ -91,6 +93,23 @@ def test_an_address_has_no_more_for_many_connections_than_for_some() -> None:
     assert calm.pay(0.0, 0.001)
     assert accounts.stranger("192.0.2.2").pay(0.0, STRANGER.burst), "another address has its own"
     assert accounts.member("192.0.2.1").pay(0.0, MEMBER.burst), "and members of the same one too"
+
+
+def test_connections_of_an_address_that_have_taken_much_share_one_pace() -> None:
+    """SPEC P647: forty pages of one address had a turn each in one round of the event loop, 80 ms together."""
+    accounts = Accounts()
+    greedy = [accounts.member("192.0.2.1") for _ in range(4)]
+    for account in greedy:
+        assert account.pay(0.0, 0.2)
+    assert all(account.is_strained for account in greedy)
+    rests = [account.rest(0.0, 0.002) for account in greedy]
+    assert rests == pytest.approx([n * 0.002 / PACE.per_second for n in (1, 2, 3, 4)]), "one after another"
+    calm = accounts.member("192.0.2.1")
+    calm.pay(0.0, 0.0001)
+    assert calm.rest(0.0, 0.0001) == pytest.approx(0.0001 * CALM_REST), "a pupil at the same school draws on"
+    other = accounts.member("192.0.2.2")
+    other.pay(0.0, 0.0001)
+    assert other.rest(0.0, 0.0001) == pytest.approx(0.0001)
 
 
 def test_a_network_is_counted_as_one_whatever_its_addresses() -> None:

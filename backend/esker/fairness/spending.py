@@ -38,7 +38,10 @@ STRAINED_PRICE: Final = 2.0
 PACE: Final = Rate(0.2, 0.0)
 """Processor time of the requests of one address that has asked for much, and of its connections together where they
 have taken much: a rest follows each, in which others have their turns."""
-LONGEST_REST: Final = 0.5
+LONGEST_REST: Final = 5.0
+CALM_REST: Final = 100.0
+"""A connection that has taken little itself rests no longer than so many times what it takes, beside those of its
+address that have taken much: what somebody draws comes a moment later, and not when theirs is paid."""
 USUAL_SECONDS: Final = 0.001
 """What a request costs, before anything is known of those of its address."""
 NETWORK: Final = 3.0
@@ -137,12 +140,13 @@ class Account:
 
     def rest(self, now: float, seconds: float) -> float:
         """Returns for how long the connection rests after it took so many seconds."""
-        rest = seconds * STRAINED_REST if self._own.share < MUCH else seconds
+        is_calm = self._own.share >= MUCH
+        rest = seconds if is_calm else seconds * STRAINED_REST
         if self._is_crowded:
             pace = self._pace()
             pace.pay(now, seconds)
-            rest = max(rest, pace.debt)
-        return min(rest, LONGEST_REST)
+            rest = max(rest, min(pace.debt, seconds * CALM_REST if is_calm else LONGEST_REST))
+        return rest
 
     def pay(self, now: float, seconds: float) -> bool:
         """Pays; False when the connection has to end."""
