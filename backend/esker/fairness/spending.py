@@ -39,7 +39,7 @@ PACE: Final = Rate(0.2, 0.0)
 """Processor time of the requests of one address that has asked for much, and of its connections together where they
 have taken much: a rest follows each, in which others have their turns."""
 LONGEST_REST: Final = 5.0
-CALM_REST: Final = 100.0
+CALM_REST: Final = 20.0
 """A connection that has taken little itself rests no longer than so many times what it takes, beside those of its
 address that have taken much: what somebody draws comes a moment later, and not when theirs is paid."""
 USUAL_SECONDS: Final = 0.001
