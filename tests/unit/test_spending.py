@@ -107,6 +107,8 @@ def test_connections_of_an_address_that_have_taken_much_share_one_pace() -> None
     calm = accounts.member("192.0.2.1")
     calm.pay(0.0, 0.0001)
     assert calm.rest(0.0, 0.0001) == pytest.approx(0.0001 * CALM_REST), "a pupil at the same school draws on"
+    fresh = accounts.member("192.0.2.1")
+    assert fresh.rest(0.0, 0.002) > 0.04, "one of forty that have taken little each does not"
     other = accounts.member("192.0.2.2")
     other.pay(0.0, 0.0001)
     assert other.rest(0.0, 0.0001) == pytest.approx(0.0001)

@@ -40,8 +40,10 @@ PACE: Final = Rate(0.2, 0.0)
 have taken much: a rest follows each, in which others have their turns."""
 LONGEST_REST: Final = 5.0
 CALM_REST: Final = 20.0
-"""A connection that has taken little itself rests no longer than so many times what it takes, beside those of its
-address that have taken much: what somebody draws comes a moment later, and not when theirs is paid."""
+CALM_SECONDS: Final = 0.001
+"""A connection that has taken little itself, and takes no more than this at once, rests no longer than ``CALM_REST``
+times that, beside those of its address that have taken much: what somebody draws comes a moment later, and not when
+theirs is paid."""
 USUAL_SECONDS: Final = 0.001
 """What a request costs, before anything is known of those of its address."""
 NETWORK: Final = 3.0
@@ -145,7 +147,8 @@ class Account:
         if self._is_crowded:
             pace = self._pace()
             pace.pay(now, seconds)
-            rest = max(rest, min(pace.debt, seconds * CALM_REST if is_calm else LONGEST_REST))
+            is_small = is_calm and seconds <= CALM_SECONDS
+            rest = max(rest, min(pace.debt, seconds * CALM_REST if is_small else LONGEST_REST))
         return rest
 
     def pay(self, now: float, seconds: float) -> bool:
