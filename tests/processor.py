@@ -14,10 +14,9 @@ from pathlib import Path
 import pytest
 
 TOLD = 12
-"""So many tests are named at the end."""
+"""The summary at the end of a run names so many tests."""
 RARELY_SECONDS = 0.3
 """Looking through the processes takes milliseconds: what several short tests took is told of the last one."""
-HERTZ = os.sysconf("SC_CLK_TCK")
 
 
 def tree_seconds(root: int) -> float:
@@ -38,7 +37,7 @@ def tree_seconds(root: int) -> float:
         more = {each for each, parent in parents.items() if parent in ours} - ours
         grown = bool(more)
         ours |= more
-    return sum(ticks.get(each, 0) for each in ours) / HERTZ
+    return sum(ticks.get(each, 0) for each in ours) / os.sysconf("SC_CLK_TCK")
 
 
 class Processor:

@@ -29,7 +29,7 @@ def alone() -> Iterator[None]:
 
 
 def wait(until: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + PATIENCE
     while not until():
         assert time.monotonic() < deadline
         time.sleep(0.02)

@@ -209,7 +209,8 @@ def test_a_connection_that_has_taken_much_rests_longer_and_after_less(monkeypatc
             clock.used += 0.003
 
         wire.server.listen(slow)
-        wire.server.loop = noting = Noting()  # type: ignore[assignment]
+        noting = Noting()
+        monkeypatch.setattr(wire.server, "loop", noting)
         rests = []
         while not broke:
             wire.server.data_received(text_frame("x") * 2)

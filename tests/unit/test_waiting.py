@@ -146,6 +146,36 @@ def test_a_heavy_document_is_encoded_outside_of_the_event_loop(tmp_path: Path, m
     assert where[0].startswith("reading")
 
 
+def test_fragments_of_long_texts_of_all_sockets_go_one_after_another() -> None:
+    """SPEC P649: all that fits into a socket was written in one turn of the event loop, for two hundred at once."""
+
+    async def run() -> None:
+        loop, long, rounds = asyncio.get_running_loop(), Turnstile(), 0
+        went: list[tuple[str, int]] = []
+
+        def count() -> None:
+            nonlocal rounds
+            rounds += 1
+            loop.call_soon(count)
+
+        def transport(name: str) -> route.WireTransport:
+            def write_now(_: bytes) -> bool:
+                went.append((name, rounds))
+                return True
+
+            wire = Mock(writable=asyncio.Event(), write_now=write_now)
+            wire.writable.set()
+            return route.WireTransport(Mock(scope={"esker.socket": wire}, client=Mock(host=name)), long)
+
+        loop.call_soon(count)
+        text = (b"x" * (3 * route.FRAGMENT_BYTES),)
+        await asyncio.gather(*(transport(name).send_long(text, Mock()) for name in ("ada", "ben")))
+        assert [name for name, _ in went[1:5]] in (["ada", "ben"] * 2, ["ben", "ada"] * 2), "addresses have turns"
+        assert len({each for _, each in went}) == len(went) == 6, "one in a round of the loop"
+
+    asyncio.run(run())
+
+
 def test_a_long_text_arrives_whole_from_its_parts() -> None:
     async def run() -> None:
         wire = Wire()

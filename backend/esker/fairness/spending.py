@@ -13,10 +13,12 @@ from collections import OrderedDict
 from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import partial
-from typing import Final
+from typing import Final, TypeVar
 
 from esker.fairness.shares import MOST_KEYS, Rate, Who
+
+K = TypeVar("K")
+V = TypeVar("V")
 
 STRANGER: Final = Rate(0.02, 0.1)
 """Processor time of a connection that has not been let in: seconds a second, and seconds that may be saved up."""
@@ -39,11 +41,11 @@ PACE: Final = Rate(0.2, 0.0)
 """Processor time of the requests of one address that has asked for much, and of its connections together where they
 have taken much: a rest follows each, in which others have their turns."""
 LONGEST_REST: Final = 5.0
-CALM_REST: Final = 20.0
-CALM_SECONDS: Final = 0.001
-"""A connection that has taken little itself, and takes no more than this at once, rests no longer than ``CALM_REST``
-times that, beside those of its address that have taken much: what somebody draws comes a moment later, and not when
-theirs is paid."""
+"""A connection rests no longer than this, however much its address has to make up for."""
+CALM_REST, CALM_SECONDS = 20.0, 0.001
+"""A connection that has taken little itself, and takes no more than ``CALM_SECONDS`` at once, rests no longer than
+``CALM_REST`` times that, beside those of its address that have taken much: what somebody draws comes a moment later,
+and not when the others have paid."""
 USUAL_SECONDS: Final = 0.001
 """What a request costs, before anything is known of those of its address."""
 NETWORK: Final = 3.0
@@ -120,11 +122,9 @@ _STRANGER, _MEMBER, _ASKER = _Kind(STRANGER, STRANGERS), _Kind(MEMBER, MEMBERS),
 class Account:
     """The purse of one connection, with those that it shares."""
 
-    def __init__(
-        self, shared: tuple[Purse, ...] = (), kind: _Kind = _STRANGER, pace: Callable[[], Purse] = lambda: Purse(PACE)
-    ) -> None:
-        """``pace``: of all connections of the address."""
-        self._own, self._shared, self._pace = Purse(kind.own), shared, pace
+    def __init__(self, shared: tuple[Purse, ...] = (), kind: _Kind = _STRANGER, pace: Purse | None = None) -> None:
+        """``pace``: what all connections of the address are read at where they have taken much (default: its own)."""
+        self._own, self._shared, self._pace = Purse(kind.own), shared, pace or Purse(PACE)
 
     @property
     def is_strained(self) -> bool:
@@ -145,10 +145,9 @@ class Account:
         is_calm = self._own.share >= MUCH
         rest = seconds if is_calm else seconds * STRAINED_REST
         if self._is_crowded:
-            pace = self._pace()
-            pace.pay(now, seconds)
+            self._pace.pay(now, seconds)
             is_small = is_calm and seconds <= CALM_SECONDS
-            rest = max(rest, min(pace.debt, seconds * CALM_REST if is_small else LONGEST_REST))
+            rest = max(rest, min(self._pace.debt, seconds * CALM_REST if is_small else LONGEST_REST))
         return rest
 
     def pay(self, now: float, seconds: float) -> bool:
@@ -184,28 +183,20 @@ class Accounts:
 
     def pace(self, address: str) -> Pace:
         """Returns the pace of the requests of this address."""
-        home = Who(address).home
-        pace = self._paces[home] = self._paces.pop(home) if home in self._paces else Pace()
-        while len(self._paces) > self._most:
-            self._paces.popitem(last=False)
-        return pace
+        return self._known(self._paces, Who(address).home, Pace)
 
     def _open(self, address: str, kind: _Kind) -> Account:
         shared = tuple(self._purse(place, key, kind) for place, key in Who(address).counted())
-        return Account(shared, kind, partial(self._crowd, Who(address).home))
-
-    def _crowd(self, home: str) -> Purse:
-        """The pace at which the connections of an address are read, where they have taken much."""
-        pace = self._crowds[home] = self._crowds.pop(home) if home in self._crowds else Purse(PACE)
-        while len(self._crowds) > self._most:
-            self._crowds.popitem(last=False)
-        return pace
+        return Account(shared, kind, self._known(self._crowds, Who(address).home, lambda: Purse(PACE)))
 
     def _purse(self, place: str, key: str, kind: _Kind) -> Purse:
         times = NETWORK if place == "network" else 1.0
         rate = Rate(times * kind.shared.per_second, times * kind.shared.burst)
-        purse = self._purses.pop((place, key, kind), None) or Purse(rate)
-        self._purses[place, key, kind] = purse
-        while len(self._purses) > self._most:
-            self._purses.popitem(last=False)
-        return purse
+        return self._known(self._purses, (place, key, kind), lambda: Purse(rate))
+
+    def _known(self, known: OrderedDict[K, V], key: K, make: Callable[[], V]) -> V:
+        """Returns what is known under a key, which is used last now, or makes it."""
+        found = known[key] = known.pop(key) if key in known else make()
+        while len(known) > self._most:
+            known.popitem(last=False)
+        return found

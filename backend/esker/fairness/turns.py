@@ -19,6 +19,12 @@ SERVER = Who("")
 """A name for the server itself, where it asks for a turn of its own."""
 
 
+class Turn:
+    """A turn that somebody has. Where ``rest`` is set, the next begins so many seconds after its end."""
+
+    rest = 0.0
+
+
 class Turns:
     """``async with turns.turn(who):`` holds a turn. Lives in one event loop."""
 
@@ -32,18 +38,25 @@ class Turns:
         return self._line.running >= self._most
 
     @asynccontextmanager
-    async def turn(self, who: Who) -> AsyncIterator[None]:
+    async def turn(self, who: Who) -> AsyncIterator[Turn]:
         """Waits for a turn. Raises Full when too many of this address wait already."""
-        key, mine = who.site, asyncio.get_running_loop().create_future()
+        loop, key, turn = asyncio.get_running_loop(), who.site, Turn()
+        mine = loop.create_future()
         self._line.join(key, mine)
         self._serve()
         try:
             await mine
-            yield
+            yield turn
         finally:
             if not self._line.leave(key, mine):
-                self._line.done(key)
-                self._serve()
+                if turn.rest > 0:
+                    loop.call_later(turn.rest, self._over, key)
+                else:
+                    self._over(key)
+
+    def _over(self, key: str) -> None:
+        self._line.done(key)
+        self._serve()
 
     def _serve(self) -> None:
         while (found := self._line.next()) is not None:
@@ -61,33 +74,16 @@ class Turnstile:
     """
 
     def __init__(self) -> None:
-        self._line: Line[asyncio.Future[None]] = Line(1)
+        self._turns = Turns(1)
 
     async def run(self, who: Who, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Returns what ``work``, which waits for nothing, returns or raises."""
-        loop = asyncio.get_running_loop()
-        key, mine, spent = who.site, loop.create_future(), 0.0
-        self._line.join(key, mine)
-        self._serve()
-        try:
-            await mine
+        async with self._turns.turn(who) as turn:
             began = time.thread_time()
             try:
                 return work(*args, **kwargs)
             finally:
-                spent = time.thread_time() - began
-        finally:
-            if not self._line.leave(key, mine):
-                loop.call_later(spent, self._rested, key)
-
-    def _rested(self, key: str) -> None:
-        self._line.done(key)
-        self._serve()
-
-    def _serve(self) -> None:
-        while (found := self._line.next()) is not None:
-            if not found.done():  # see ``Turns``
-                found.set_result(None)
+                turn.rest = time.thread_time() - began
 
 
 class FairThreads:

@@ -54,7 +54,6 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
     """The object that an application finds as ``scope["esker.socket"]``, beside ASGI's ``receive`` and ``send``."""
 
     _listener: Callable[[str | bytes], None] | None = None
-    _account: Account | None = None
     _broke: Callable[[], None] | None = None
     _deaf = False
     _rest = b""
@@ -69,6 +68,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         """As uvicorn makes its own."""
         super().__init__(*arguments, **named)
         self._boundaries = FrameBoundaries()
+        self._account = Account()
 
     async def run_asgi(self) -> None:
         """Runs the application."""
@@ -160,8 +160,6 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         """Pays for what was done for this connection elsewhere."""
         if self._deaf or self.disconnected:
             return
-        if self._account is None:
-            self._account = Account()
         if self._account.pay(self.loop.time(), seconds):
             return
         self._deaf, self._rest = True, b""
@@ -190,7 +188,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
     def _parse(self, data: bytes) -> None:
         """Whole plain texts are understood here, all else by the library's parser, for one turn."""
         began, at, spent = time.thread_time(), 0, 0.0
-        is_strained = self._account is not None and self._account.is_strained
+        is_strained = self._account.is_strained
         turn = STRAINED_TURN_SECONDS if is_strained else TURN_SECONDS
         while at < len(data) and spent < turn and not self._deaf and not self.disconnected:
             taken = self._take_texts(data, at, began + turn)
@@ -203,12 +201,11 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
                     self._refuse_handshake()
             at += taken
             spent = time.thread_time() - began
-        account = self._account or Account()
-        self.pay(account.price(spent))
+        self.pay(self._account.price(spent))
         if (at < len(data) or (is_strained and data)) and not self._deaf and not self.disconnected:
             self._rest = data[at:]
             self.transport.pause_reading()
-            self._turn = self.loop.call_later(account.rest(self.loop.time(), spent), self._go_on)
+            self._turn = self.loop.call_later(self._account.rest(self.loop.time(), spent), self._go_on)
 
     def _refuse_handshake(self) -> None:
         """The request asked for a websocket and cannot be one: it has a body, say. The library says nothing then."""

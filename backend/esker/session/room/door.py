@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from esker import contract as c
 from esker.fairness.shares import Rate, Rates, Who
 from esker.session.room.entry import Denied
 from esker.store.access import Access, Link
@@ -48,6 +49,12 @@ class Door:
             raise Denied("revoked", "This link was revoked by the owner of the terrain.")
         if (deleted := self._deletion.deleted(terrain)) is not None:
             raise Deleted(link, deleted + GRACE_SECONDS)
+        return link
+
+    def called(self, hello: c.Hello, address: str) -> Link:
+        """Returns the link by which somebody comes, and counts who came. Raises Denied."""
+        link = self.authorise(hello.terrain, hello.secret, address)
+        self.count(Who(address, link.id), history=hello.at is not None)
         return link
 
     def demand(self, link: Link) -> None:

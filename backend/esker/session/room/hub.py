@@ -121,7 +121,7 @@ class Hub:
         """Lets a client into its room, opening it if need be. Raises Denied."""
         if self._closing:
             raise Denied("shutting_down", "The server is stopping. Your page will come back by itself.")
-        link = await self._turnstile.run(Who(address), self._called, hello, address)
+        link = await self._turnstile.run(Who(address), self.door.called, hello, address)
         who = Who(address, link.id)
         if hello.at is not None:
             present = partial(self.strokes, hello.terrain, None, who) if link.role == "view" else None
@@ -137,12 +137,6 @@ class Hub:
             guest = await self._turnstile.run(who, self._joined, room, hello, link, outbox, address, asked)
             if guest is not None:
                 return room, guest
-
-    def _called(self, hello: c.Hello, address: str) -> Link:
-        """Returns the link by which somebody comes, who counts from now on. Raises Denied."""
-        link = self.door.authorise(hello.terrain, hello.secret, address)
-        self.door.count(Who(address, link.id), history=hello.at is not None)
-        return link
 
     def _joined(
         self, room: Room, hello: c.Hello, link: Link, outbox: Outbox, address: str, asked: int | None

@@ -17,7 +17,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from esker.store.engine.ports import GROUP_LIMIT, Connection, Unwritable, UsedTwice
+from esker.store.engine.ports import Connection, Unwritable, UsedTwice
+from esker.store.engine.writer import write_all
 from esker.store.space import NoSpace, Space
 from esker.store.upkeep import migrations
 from esker.store.upkeep.backup import keep_copy, write_backup
@@ -50,7 +51,7 @@ class Sqlite:
         self._closed = False
         self.is_local = self.writable = self.answers = True
         self.hear_of_again: Callable[[], object] = lambda: None
-        self._thread = threading.Thread(target=self._write_all, name="journal", daemon=True)
+        self._thread = threading.Thread(target=write_all, args=(self._queue, self._commit), name="journal", daemon=True)
         self._thread.start()
 
     # --- writing ------------------------------------------------------------------------------------------------
@@ -66,28 +67,6 @@ class Sqlite:
     @property
     def waiting(self) -> int:
         return self._queue.qsize()
-
-    def _write_all(self) -> None:
-        while self._write_next():  # which holds no batch while it waits for the next, nor the rooms that wait for it
-            pass
-
-    def _write_next(self) -> bool:
-        """Commits what waits, once something does. Returns False when nothing is to be written after it."""
-        item = self._queue.get()
-        if item is None:
-            return False
-        batch, stop = [item], False
-        while len(batch) < GROUP_LIMIT:
-            try:
-                more = self._queue.get_nowait()
-            except queue.Empty:
-                break
-            if more is None:
-                stop = True
-                break
-            batch.append(more)
-        self._commit(batch)
-        return not stop
 
     def _commit(self, batch: list[Item]) -> None:
         db = self.writer_db

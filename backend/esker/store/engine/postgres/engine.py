@@ -24,9 +24,10 @@ from typing import Any, Final, NamedTuple, Protocol, TypeVar
 import psycopg
 from psycopg import errors
 
-from esker.store.engine.ports import GROUP_LIMIT, Connection, Moved, Unknown, Unreachable, Unwritable, UsedTwice
+from esker.store.engine.ports import Connection, Moved, Unknown, Unreachable, Unwritable, UsedTwice
 from esker.store.engine.postgres import migrations
 from esker.store.engine.postgres.connections import Database, Readers, Writing, connect, first_line
+from esker.store.engine.writer import write_all
 from esker.store.space import NoSpace
 
 log = logging.getLogger("esker.postgres")
@@ -92,7 +93,7 @@ class Postgres:
         self.is_local, self.writable = False, True
         self.hear_of_again: Callable[[], object] = lambda: None
         """Called in the writer's thread before items are run again."""
-        self._thread = threading.Thread(target=self._write_all, name="journal", daemon=True)
+        self._thread = threading.Thread(target=write_all, args=(self._queue, self._commit), name="journal", daemon=True)
         self._thread.start()
 
     # --- writing ------------------------------------------------------------------------------------------------
@@ -117,30 +118,9 @@ class Postgres:
         """Whether the database answered whoever read last."""
         return self._readers.answers
 
-    def _write_all(self) -> None:
-        while self._write_next():  # which holds no batch while it waits for the next, nor the rooms that wait for it
-            pass
-
-    def _write_next(self) -> bool:
-        """Commits what waits, once something does. Returns False when nothing is to be written after it."""
-        item = self._queue.get()
-        if item is None:
-            return False
-        batch, stop = [item], False
-        while len(batch) < GROUP_LIMIT:
-            try:
-                more = self._queue.get_nowait()
-            except queue.Empty:
-                break
-            if more is None:
-                stop = True
-                break
-            batch.append(more)
-        self._commit([item for item in batch if item.future.set_running_or_notify_cancel()])
-        return not stop
-
     def _commit(self, batch: list[Item]) -> None:
         """Commits a batch and resolves its futures."""
+        batch = [item for item in batch if item.future.set_running_or_notify_cancel()]
         outcomes: list[tuple[Any, Exception | None]]
         try:
             outcomes = self._committed(batch)
