@@ -225,14 +225,14 @@ fn root_guide(job: SynthJob, at: vec2i) -> f32 {
   return held_ground(job, clamp(at, vec2i(-SLOT_BORDER), vec2i(LAST_SAMPLE))).x;
 }
 
-// What a rule starts from at the children of a cell.
+// What a rule starts from at the children of a cell. Level 0 has no parent: nothing is `before` it.
 struct Start {
   ground: Ground,
   before: SynthState,
   grounds: Grounds,
 };
 
-// Level 0: the rule on the guide itself; constants and targets stand for the parent that it does not have.
+// Level 0: the rule on the guide itself.
 fn root_start(job: SynthJob, at: vec2i) -> Start {
   var rows: array<vec4f, 4>;
   for (var row = 0; row < 4; row += 1) {
@@ -252,9 +252,10 @@ fn root_start(job: SynthJob, at: vec2i) -> Start {
   let slope_y = (north - south) * (0.5 * per_m);
   let second = ((west - z) + (east - z)) + ((south - z) + (north - z));
   let ground = Ground(z, slope_x, slope_y, concavity(second * per_m), sqrt(slope_x * slope_x + slope_y * slope_y));
-  let goal = targets(site, ground);
-  let before = SynthState(vec4f(0.0), vec4f(SYNTH_SMOOTHNESS), goal.snow, goal.wet, goal.grass, goal.forest, goal.foam, vec4f(0.0));
-  return Start(ground, before, Grounds(z, z));
+  var out: Start;
+  out.ground = ground;
+  out.grounds = Grounds(z, z);
+  return out;
 }
 
 // Returns the start at the children of a cell from the parent's samples.
@@ -277,6 +278,11 @@ fn child_start(cell: Cell) -> Start {
   return Start(ground, before, interpolated(a, b, c, d));
 }
 
+// Constants and targets stand for the parent that level 0 does not have.
+fn orphan(goal: Targets) -> SynthState {
+  return SynthState(vec4f(0.0), vec4f(SYNTH_SMOOTHNESS), goal.snow, goal.wet, goal.grass, goal.forest, goal.foam, vec4f(0.0));
+}
+
 // One entry for all levels: a second one for the root would compile the rule, most of the code, a second time.
 @compute @workgroup_size(64)
 fn synthesise(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
@@ -288,7 +294,9 @@ fn synthesise(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
   let i = global_pair(job.x, cell.child.x, job.level);
   let j = global_pair(job.y, cell.child.y, job.level);
   let noise = noise_of(job.level, i, j);
-  let made = rule(site, job.level, start.ground, start.before, asked_of(job.level, i, j), noise);
+  let goal = targets(start.ground);
+  if (job.level == 0u) { start.before = orphan(goal); }
+  let made = rule(job.level, start.ground, start.before, goal, asked_of(job.level, i, j), noise);
   put_children(job, cell.child, start.grounds, made, noise);
 }
 

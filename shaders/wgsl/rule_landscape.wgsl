@@ -7,9 +7,9 @@ fn mixed(before: vec4f, goal: vec4f, noise: vec4f, constants: SynthLevel) -> vec
   return unit(blended(before + constants.channel_noise * noise * undecided, goal, constants.tie));
 }
 
-fn rule(site: SynthSite, level: u32, ground: Ground, before: SynthState, asked: Asked, noise: SynthNoise) -> SynthState {
+fn rule(level: u32, ground: Ground, before: SynthState, goal: Targets, asked: Asked,
+    noise: SynthNoise) -> SynthState {
   let constants = site.levels[level];
-  let goal = targets(site, ground);
   var out: SynthState;
   out.h = smoothness(blended(before.h + constants.smoothness_noise * noise_low(noise.b), goal.h, constants.tie));
   out.snow = painted(mixed(before.snow, goal.snow, noise_high(noise.b), constants), asked.snow);
@@ -36,10 +36,10 @@ fn rule(site: SynthSite, level: u32, ground: Ground, before: SynthState, asked: 
     out.d = before.d + size * noise_full(noise.a);
     return out;
   }
-  let worn = wear(site, level, ground, asked);
+  let worn = wear(level, ground, asked);
   out.d = before.d + size * worn.calm * noise_full(noise.a);
   let depth = worn.depth * heard;
-  if (any(depth != vec4f(0.0))) { out.d += depth * gullies(site, level, ground, noise.i, noise.j); }
+  if (any(depth != vec4f(0.0))) { out.d += depth * gullies(level, ground, noise.i, noise.j); }
   var below = worn.finer;
   if (site.surveyed == 1u) { below *= hushed(f32(level), asked.survey, vec4f(-log2(SYNTH_GULLY_FALL))); }
   out.finer += below;

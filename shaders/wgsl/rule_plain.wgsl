@@ -2,8 +2,8 @@
 // backend/esker/synthesis/rules/plain.py.
 const BSPLINE_BASE: bool = false;
 
-fn rule(site: SynthSite, level: u32, ground: Ground, before: SynthState, asked: Asked, noise: SynthNoise) -> SynthState {
-  let goal = targets(site, ground);
+fn rule(level: u32, ground: Ground, before: SynthState, goal: Targets, asked: Asked,
+    noise: SynthNoise) -> SynthState {
   var out: SynthState;
   out.h = smoothness(goal.h);
   out.snow = painted(unit(goal.snow), asked.snow);

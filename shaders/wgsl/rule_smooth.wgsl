@@ -2,9 +2,9 @@
 // B-spline (paper 1, section 4). docs/synthesis.md, "Smooth"; backend/esker/synthesis/rules/smooth.py.
 const BSPLINE_BASE: bool = true;
 
-fn rule(site: SynthSite, level: u32, ground: Ground, before: SynthState, asked: Asked, noise: SynthNoise) -> SynthState {
+fn rule(level: u32, ground: Ground, before: SynthState, goal: Targets, asked: Asked,
+    noise: SynthNoise) -> SynthState {
   let tie = site.levels[level].tie;
-  let goal = targets(site, ground);
   var out: SynthState;
   out.h = smoothness(blended(before.h, goal.h, tie));
   out.snow = painted(unit(blended(before.snow, goal.snow, tie)), asked.snow);

@@ -29,7 +29,7 @@ fn gully_profile(t: vec4f) -> vec4f {
 }
 
 // A cell of the lattice of pivots as the hash takes it. In a cyclic domain there is a whole number of them.
-fn lattice_index(site: SynthSite, level: u32, cell: i32) -> u32 {
+fn lattice_index(level: u32, cell: i32) -> u32 {
   if (site.cyclic == 0u) { return bitcast<u32>(cell); }
   let count = (TILE_CELLS << level) / site.gully_side;
   return bitcast<u32>((cell + count) % count);
@@ -37,7 +37,7 @@ fn lattice_index(site: SynthSite, level: u32, cell: i32) -> u32 {
 
 // The octave of a level for a depth of 1. A wave reaches less than a cell beyond its own: the nine cells about a sample are
 // all that it sees, and the sixteen about four children add nothing else.
-fn gullies(site: SynthSite, level: u32, ground: Ground, i: vec2i, j: vec2i) -> vec4f {
+fn gullies(level: u32, ground: Ground, i: vec2i, j: vec2i) -> vec4f {
   let side = site.gully_side;
   let first = vec2i(i.x + side, j.x + side) / side - 1;   // no index is below -side
   let last = vec2i(i.y + side, j.y + side) / side - 1;
@@ -53,9 +53,9 @@ fn gullies(site: SynthSite, level: u32, ground: Ground, i: vec2i, j: vec2i) -> v
   var sine = vec4f(0.0);
   var weights = vec4f(0.0);
   for (var b = first.y - 1; b <= last.y + 1; b += 1) {
-    let row = synth_mix(key + lattice_index(site, level, b));
+    let row = synth_mix(key + lattice_index(level, b));
     for (var a = first.x - 1; a <= last.x + 1; a += 1) {
-      let word = vec4u(synth_mix(row + lattice_index(site, level, a)));
+      let word = vec4u(synth_mix(row + lattice_index(level, a)));
       let east = f32(a - first.x) + (0.5 + SYNTH_GULLY_JITTER * noise_low(word).x);
       let north = f32(b - first.y) + (0.5 + SYNTH_GULLY_JITTER * noise_high(word).x);
       let qx = u.xyxy - east;
@@ -85,7 +85,7 @@ fn gully_steepness(slope: vec4f) -> vec4f {
   return rise(SYNTH_GULLY_FLAT_FROM, SYNTH_GULLY_FLAT_TO, slope) * min(slope, vec4f(SYNTH_GULLY_STEEP));
 }
 
-fn wear(site: SynthSite, level: u32, ground: Ground, asked: Asked) -> Wear {
+fn wear(level: u32, ground: Ground, asked: Asked) -> Wear {
   let constants = site.levels[level];
   let painted = site.erosion * (1.0 + min(asked.erosion, vec4f(0.0))) + max(asked.erosion, vec4f(0.0));
   let strength = min(painted, vec4f(MAX_EROSION));

@@ -14,7 +14,7 @@ fn rise(low: f32, high: f32, x: vec4f) -> vec4f {
   return t * t * (3.0 - 2.0 * t);
 }
 
-fn targets(site: SynthSite, ground: Ground) -> Targets {
+fn targets(ground: Ground) -> Targets {
   let above_sea = ground.height - site.sea;
   let e = above_sea / site.relief;
   let t2 = ground.slope_x * ground.slope_x + ground.slope_y * ground.slope_y;
