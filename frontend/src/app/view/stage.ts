@@ -255,9 +255,11 @@ export class Stage {
       quiet: this.quietStrokes.quiet.value,
       clear: !this.view.quietLines,
     };
-    // Lines of paint lie on the ground and move with it.
-    if (hasPaint(doc)) this.tiles.revision.value;
-    return doc ? strokeVisuals(doc, marks, this.session.people.value, this.shown.freeze()) : [];
+    // Lines of paint lie on the ground and move with it. Others do not ask for the ground: it is not made for them.
+    const painted = hasPaint(doc);
+    if (painted) this.tiles.revision.value;
+    const ground = painted ? this.shown.freeze() : this.shown.ground;
+    return doc ? strokeVisuals(doc, marks, this.session.people.value, ground) : [];
   }
 
   /** Finds a renderer and starts drawing. */
@@ -381,7 +383,11 @@ export class Stage {
       effect(() => {
         this.tiles.revision.value;
         const isDrawing = this.input.drawing.value !== null;
-        this.#arrival.follow(landOfTiles(this.tiles), isDrawing, (land) => this.camera.stand(land));
+        this.#arrival.follow(
+          () => landOfTiles(this.tiles),
+          isDrawing,
+          (land) => this.camera.stand(land),
+        );
       }),
     );
     this.#stops.push(this.box.watch());
