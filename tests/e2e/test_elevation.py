@@ -8,15 +8,17 @@ from __future__ import annotations
 import base64
 import json
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from esker.api.terrain import Terrain
-from esker.contract import DEFAULT_SIZE_M
+from esker.contract import DEFAULT_LEVEL, DEFAULT_SIZE_M
 from esker.grid import quantum, spacing
-from tests.e2e.conftest import LEVEL, Server, Visitor, Visitors
+from tests.e2e.conftest import Server, Visitor, Visitors, serving
 from tests.e2e.hands import (
     COARSE,
     arch,
@@ -41,9 +43,9 @@ DROP = """([name, text]) => {
   for (const type of ["dragenter", "dragover", "drop"])
     target.dispatchEvent(new DragEvent(type, { dataTransfer, bubbles: true, cancelable: true, composed: true }));
 }"""
-TOLERANCE = quantum(LEVEL, DEFAULT_SIZE_M)
+TOLERANCE = quantum(DEFAULT_LEVEL, DEFAULT_SIZE_M)
 SURVEY_M = 10.0
-"""Spacing of the first survey, between those of two levels."""
+"""Spacing of the first survey, between those of the two finest levels."""
 IMPORTED_S = 240
 """A file is read by another process; in a clean checkout the first one also compiles the loops that lay it."""
 CRATER = (1990.0, 1900.0)
@@ -90,10 +92,9 @@ def twin(server: Server, terrain: str, secret: str, path: Path) -> Terrain:
 
 def apart(visitor: Visitor, made: Terrain) -> float:
     """Greatest difference of the page's ground to Python's, metres, where the page holds the finest solved level."""
-    step = 2 ** (LEVEL + 1)
-    whole = made.heights(LEVEL)[::step, ::step]
-    wait_whole(visitor, level=LEVEL)
-    held = np.array(levels(visitor, COARSE)) == LEVEL
+    whole = made.heights(DEFAULT_LEVEL)[::32, ::32]
+    wait_whole(visitor, level=DEFAULT_LEVEL)
+    held = np.array(levels(visitor, COARSE)) == DEFAULT_LEVEL
     assert held.mean() > 0.3
     return float(np.abs(np.array(heights(visitor, COARSE)) - whole.ravel())[held].max())
 
@@ -111,6 +112,12 @@ def off_the_data(visitor: Visitor, made: Terrain) -> float:
         wanted = made.sample(np.array(COARSE)[here], tolerance=step / 4 if step > SURVEY_M else 0.0)
         worst = max(worst, float(np.abs(shown[here] - np.asarray(wanted)).max()) / quantum(int(level), DEFAULT_SIZE_M))
     return worst
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    """A server that solves all that the product's does: 10 m of a survey lie between its levels."""
+    yield from serving(tmp_path, DEFAULT_LEVEL)
 
 
 def test_real_ground_is_dropped_sketched_on_and_refined_by_a_turned_grid(
@@ -145,7 +152,7 @@ def test_real_ground_is_dropped_sketched_on_and_refined_by_a_turned_grid(
     wait_settled(ada, ben)
     (stroke,) = ada.js("() => window.esker.strokes()")
     assert stroke["first"][2] > 1500
-    wait_whole(ben, level=LEVEL)
+    wait_whole(ben, level=DEFAULT_LEVEL)
     after = heights(ben, COARSE)
     assert max(np.subtract(after, before)) > 20
     made = twin(server, terrain, secret, tmp_path / "two.esker")
@@ -187,7 +194,7 @@ def test_real_ground_is_dropped_sketched_on_and_refined_by_a_turned_grid(
     ada.page.keyboard.press("Control+z")
     wait(ben, "() => window.esker.layers().length === 1")
     wait_settled(ada, ben)
-    wait_whole(ben, level=LEVEL)
+    wait_whole(ben, level=DEFAULT_LEVEL)
     assert heights(ben, COARSE) == after
     for visitor in (ada, ben):
         assert visitor.errors == []
