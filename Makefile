@@ -70,7 +70,7 @@ test-levels: setup ## the tests of what is computed, compiled for narrower proce
 
 # What `make test` has in a short form: as many rooms, clients and take-overs as the issue of several servers names.
 test-long: $(STAMPS)/dev ## the long forms of tests with several servers, a full disk and strangers: before a release
-	ESKER_LONG=1 $(BIN)/python -m pytest -o cache_dir=.pytest_cache/long tests/cluster tests/store/test_full_disk.py tests/sync/test_hostile_requests.py
+	ESKER_LONG=1 $(BIN)/python -m pytest -o cache_dir=.pytest_cache/long tests/cluster tests/store/test_full_disk.py tests/sync/test_hostile_requests.py tests/solver/test_parking.py
 
 test-page:
 	$(call told,page); $(NPM) test

@@ -11,5 +11,5 @@ export default defineConfig({
   build: { target: "es2023", outDir: "dist", assetsInlineLimit: 0, chunkSizeWarningLimit: 1500 },
   worker: { format: "es" },
   // Limits end what hangs. A busy machine takes its time.
-  test: { testTimeout: 300_000, hookTimeout: 300_000 },
+  test: { pool: "threads", testTimeout: 300_000, hookTimeout: 300_000 },
 });

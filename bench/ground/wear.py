@@ -92,14 +92,17 @@ def levels(name: str, **changes: float) -> dict[str, Any]:
     return out
 
 
-def statistics(z: Grid, cell_m: float) -> dict[str, float]:
+def statistics(z: Grid, cell_m: float, sea_m: float | None = None) -> dict[str, float]:
     """Measures the hilly part of a grid: median slope; exponent b of P(area > a) ~ a^-b and the share of samples with
-    64 above them; theta of slope ~ area^-theta; hypsometric integral; basins of 1,000 samples; share under water."""
+    64 above them; theta of slope ~ area^-theta; hypsometric integral; basins of 1,000 samples of land; the share of the
+    land that lies under standing water. What the sea covers is no land: water runs to it as it does to the border."""
     n = min(z.shape)
     z = np.ascontiguousarray(z[:n, :n], np.float64)
-    found = water.find_water(water.quanta(z, cell_m))
+    sea = water.sea_quanta(sea_m, cell_m)
+    found = water.find_water(water.quanta(z, cell_m), sea)
+    land = found.z > sea
     gy, gx = np.gradient(uniform_filter(z, 15), cell_m)
-    hilly = np.hypot(gx, gy) > HILLY
+    hilly = (np.hypot(gx, gy) > HILLY) & land
     for edge in (np.s_[:4], np.s_[-4:], np.s_[:, :4], np.s_[:, -4:]):
         hilly[edge] = False
     area = found.area[hilly].astype(np.float64)
@@ -113,8 +116,8 @@ def statistics(z: Grid, cell_m: float) -> dict[str, float]:
         "area_64_share": round(float(share[3]), 4),
         "theta": round(theta(found, cell_m, hilly), 3),
         "hypsometric": round(float((heights.mean() - heights.min()) / np.ptp(heights)), 3),
-        "basins_per_1000": round(1000 * (len(found.spill) - 1) / z.size, 2),
-        "standing_water": round(float((found.filled > found.z).mean()), 4),
+        "basins_per_1000": round(1000 * (len(found.spill) - 1) / np.count_nonzero(land), 2),
+        "standing_water": round(float((found.filled > found.z)[land].mean()), 4),
     }
 
 
@@ -192,10 +195,11 @@ def measure(folder: Path | None) -> dict[str, Any]:
     grounds: dict[str, Any] = {}
     for name in SCENES:
         cell = grid.spacing(LEVEL, contract.DEFAULT_SIZE_M)
-        grounds[f"{name}, solved"] = statistics(scene(name).heights(LEVEL).astype(np.float64), cell)
+        sea_m = scene(name).settings.sea_level_m
+        grounds[f"{name}, solved"] = statistics(scene(name).heights(LEVEL).astype(np.float64), cell, sea_m)
         for label in ("noise_of_before", "gullies_hold_0.9"):
             z = scene(name, **GROUNDS[label]).heights(LEVEL, detail=True)
-            grounds[f"{name}, {label}"] = statistics(z.astype(np.float64), cell)
+            grounds[f"{name}, {label}"] = statistics(z.astype(np.float64), cell, sea_m)
     real = {name: {"cell_m": cell} | statistics(z, cell) for name, z, cell in real_grids(folder)}
     compared: Mapping[str, Any] = {
         label: levels(SCENES[0], **GROUNDS[label]) for label in ("noise_of_before", "gullies_alone", "gullies")

@@ -64,6 +64,10 @@ SLOW_SCREEN = """
   window.cancelAnimationFrame = (id) => void draws.delete(id);
 """.replace("HERTZ", str(HERTZ))
 
+NO_WEBGPU = "Object.defineProperty(Navigator.prototype, 'gpu', { get: () => undefined });"
+"""Such a browser shows the map. Opening the 3D view takes the software adapter two seconds of processor time, most of
+them for its pipelines: who is there for panels, pens or ground that arrives comes with such a one, as many do."""
+
 WATCH = """([argument, patienceMs]) => new Promise((resolve, reject) => {
   const holds = %s, end = performance.now() + patienceMs;
   const look = () => {
@@ -265,11 +269,12 @@ class Visitors:
         device_scale_factor: float = SCALE,
         slow_screen: bool = True,
         seen: bool | None = None,
+        on_map: bool = False,
         **options: Any,
     ) -> Visitor:
         """A window of so many CSS pixels, of ``device_scale_factor`` pixels each along a side.
 
-        ``seen``: its 3D view is in screenshots (default: where it has all its pixels).
+        ``seen``: its 3D view is in screenshots (default: where it has all its pixels). ``on_map``: it has no WebGPU.
         """
         shown = device_scale_factor > SCALE if seen is None else seen
         context = (self.seen() if shown else self.browser).new_context(
@@ -278,6 +283,8 @@ class Visitors:
         context.set_default_timeout(PATIENCE_MS)
         if slow_screen:
             context.add_init_script(SLOW_SCREEN)
+        if on_map:
+            context.add_init_script(NO_WEBGPU)
         visitor = Visitor(context, context.new_page(), self.server.url)
         draw_politely()  # the graphics process of a browser that was just launched may be there only now
         visitor.watch()

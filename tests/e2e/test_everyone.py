@@ -9,8 +9,6 @@ import pytest
 from tests.e2e.conftest import Server, Visitor, Visitors
 from tests.e2e.hands import COARSE, arch, draw, ellipse, heights, on_screen, wait, wait_settled
 
-NO_WEBGPU = "Object.defineProperty(Navigator.prototype, 'gpu', { get: () => undefined });"
-
 
 class Fingers:
     """Touches through the browser's own input pipeline."""
@@ -61,8 +59,7 @@ def test_a_phone_draws_with_one_finger_and_moves_with_two(visitors: Visitors, se
 def test_without_webgpu_there_is_a_map_to_sketch_on(visitors: Visitors, server: Server) -> None:
     """SPEC E5: the 2D map shows the same ground, and a ridge drawn there rises for all."""
     terrain, secret = server.create(title="Map", template="archipelago")
-    mapper = visitors()
-    mapper.page.add_init_script(NO_WEBGPU)
+    mapper = visitors(on_map=True)
     mapper.open(f"/t/{terrain}#{secret}")
     assert mapper.js("() => window.esker.renderer()") == "map"
     wait_settled(mapper)

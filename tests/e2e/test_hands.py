@@ -71,7 +71,7 @@ def test_from_the_landing_page_to_a_mountain_without_a_pointer(visitors: Visitor
 
 def test_a_line_over_the_first_raises_its_summit_for_everybody(visitors: Visitors, server: Server) -> None:
     terrain, secret = server.create(title="Over")
-    author, other = visitors(reduced_motion="reduce"), visitors(reduced_motion="reduce")
+    author, other = visitors(reduced_motion="reduce"), visitors(reduced_motion="reduce", on_map=True)
     for visitor in (author, other):
         visitor.open(f"/t/{terrain}#{secret}")
     draw(author, "b", arch((240, 320), (450, 315), 90))

@@ -33,9 +33,11 @@ def authors(visitor: Visitor) -> list[str]:
     return [str(s["author"]) for s in visitor.js("() => window.esker.strokes()")]
 
 
-def pupil(visitors: Visitors, name: str, path: str, width: int = 720, height: int = 540) -> Visitor:
+def pupil(
+    visitors: Visitors, name: str, path: str, width: int = 720, height: int = 540, on_map: bool = False
+) -> Visitor:
     """Somebody who calls themself so."""
-    made = visitors(width, height, seen=True)
+    made = visitors(width, height, seen=not on_map, on_map=on_map)
     made.context.add_init_script(f"localStorage.setItem('esker.name', {json.dumps(name)})")
     made.open(path)
     return made
@@ -47,7 +49,7 @@ def test_a_teacher_leads_a_lesson(visitors: Visitors, server: Server) -> None:
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, secret))
     path = f"/t/{terrain}#{link['secret']}"
     teacher = pupil(visitors, "Ms Ray", f"/t/{terrain}#{secret}", width=1100, height=720)
-    anne, ben = pupil(visitors, "Anne", path), pupil(visitors, "Ben", path, width=390, height=780)
+    anne, ben = pupil(visitors, "Anne", path), pupil(visitors, "Ben", path, 390, 780, on_map=True)
     press(teacher, "Inspector")
     teacher.page.get_by_role("radio", name="Lesson").click()
     teacher.page.get_by_text("3 people are here").wait_for()
@@ -130,9 +132,10 @@ def test_groups_are_on_every_device_of_who_leads(visitors: Visitors, server: Ser
     terrain, secret = server.create(title="Groups")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, secret))
     laptop = pupil(visitors, "Ms Ray", f"/t/{terrain}#{secret}", width=1100, height=720)
-    tablet = visitors(1024, 768, seen=True, has_touch=True)
+    tablet = visitors(1024, 768, has_touch=True, on_map=True)
     tablet.open(f"/t/{terrain}#{secret}")
-    anne, ben = (pupil(visitors, name, f"/t/{terrain}#{link['secret']}") for name in ("Anne", "Ben"))
+    path = f"/t/{terrain}#{link['secret']}"
+    anne, ben = (pupil(visitors, name, path, on_map=True) for name in ("Anne", "Ben"))
     for each in (laptop, tablet):
         press(each, "Inspector")
         each.page.get_by_role("radio", name="Lesson").click()
@@ -168,8 +171,9 @@ def test_a_lesson_is_led_from_a_phone(visitors: Visitors, server: Server) -> Non
     """SPEC L28: by touch at 390 and at 720 pixels: what is pressed has 40 pixels, and nothing scrolls sideways."""
     terrain, secret = server.create(title="Phone")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, secret))
+    path = f"/t/{terrain}#{link['secret']}"
+    pupils = [pupil(visitors, name, path, on_map=True) for name in ("Anne", "Ben")]
     for width, height in ((390, 780), (720, 540)):
-        pupils = [pupil(visitors, name, f"/t/{terrain}#{link['secret']}") for name in ("Anne", "Ben")]
         teacher = visitors(width, height, device_scale_factor=1, has_touch=True, is_mobile=width < 720)
         teacher.open(f"/t/{terrain}#{secret}")
         press(teacher, "More")
@@ -187,9 +191,8 @@ def test_a_lesson_is_led_from_a_phone(visitors: Visitors, server: Server) -> Non
         toggle.focus()
         teacher.page.keyboard.press("Space")
         wait(pupils[0], QUIET)
-        for each in (teacher, *pupils):
-            each.context.close()
-            visitors.made.remove(each)
+        teacher.context.close()
+        visitors.made.remove(teacher)
 
 
 def test_the_page_for_parents(visitors: Visitors, server: Server) -> None:

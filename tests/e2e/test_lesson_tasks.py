@@ -13,7 +13,7 @@ import pytest
 
 from tests.e2e.conftest import Server, Visitor, Visitors, serving
 from tests.e2e.hands import Pixel, arch, draw, on_screen, wait, wait_apart, wait_settled, wait_still
-from tests.e2e.test_everyone import NO_WEBGPU, Fingers
+from tests.e2e.test_everyone import Fingers
 
 
 @pytest.fixture
@@ -90,9 +90,7 @@ def test_a_whole_lesson(visitors: Visitors, server: Server) -> None:
     wall.page.goto(f"{server.url}/wall/{terrain}/{made['id']}#{secret}")
     ada = arrive(visitors(900, 640, seen=True), server, made["code"], "Ada")
     ben = arrive(visitors(390, 780, has_touch=True, is_mobile=True), server, made["code"], "Ben")
-    cleo = visitors(720, 540)
-    cleo.context.add_init_script(NO_WEBGPU)
-    arrive(cleo, server, made["code"], "Cleo")
+    cleo = arrive(visitors(720, 540, on_map=True), server, made["code"], "Cleo")
 
     # Ada draws what is asked, by the difference; Ben by touch, somewhere else; Cleo on the map.
     press(ada, f"Task: Build this mountain, {begun} of 100 points", "esk-task-chip")

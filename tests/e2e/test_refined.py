@@ -21,12 +21,15 @@ SOLVED = LEVEL
 Point = tuple[float, float]
 
 
-def two_people(visitors: Visitors, server: Server, **options: Any) -> tuple[Visitor, Visitor, str, str]:
-    """Ada owns the terrain, Ben has an edit link; both see it."""
+def two_people(
+    visitors: Visitors, server: Server, watched_on_map: bool = False, **options: Any
+) -> tuple[Visitor, Visitor, str, str]:
+    """Ada owns the terrain, Ben has an edit link; both see it, Ben on the map where he only watches."""
     terrain, secret = server.create(title="Near the ground")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit", "name": "Ben"}, secret))
     ada = visitors(**options)
-    ben = visitors(480, 360, device_scale_factor=options.get("device_scale_factor", SCALE), seen=False)
+    scale = options.get("device_scale_factor", SCALE)
+    ben = visitors(480, 360, device_scale_factor=scale, seen=False, on_map=watched_on_map)
     ada.open(f"/t/{terrain}#{secret}")
     ben.open(f"/t/{terrain}#{link['secret']}")
     return ada, ben, terrain, secret
@@ -141,7 +144,7 @@ def test_a_crest_sharpens_as_one_comes_near(visitors: Visitors, server: Server, 
 
 def test_reach_and_border_move_everybodys_ground(visitors: Visitors, server: Server) -> None:
     """E9: both settings by pointer and by keyboard, seen on the other page, taken back by undo."""
-    ada, ben, _, _ = two_people(visitors, server, width=640, height=480)
+    ada, ben, _, _ = two_people(visitors, server, watched_on_map=True, width=640, height=480)
     draw(ada, "b", arch(on_screen(ada, 1500, 350), on_screen(ada, 2700, 300), 90))
     wait_settled(ada, ben)
     # On the border below the ridge, and well beyond the ridge's flanks.
@@ -176,7 +179,7 @@ def test_reach_and_border_move_everybodys_ground(visitors: Visitors, server: Ser
 
 def test_amplitude_and_roughness_reach_the_other_page(visitors: Visitors, server: Server) -> None:
     """E10: set in the inspector, solved, streamed as channels, undone."""
-    ada, ben, _, _ = two_people(visitors, server, width=640, height=480)
+    ada, ben, _, _ = two_people(visitors, server, watched_on_map=True, width=640, height=480)
     mountain = draw(ada, "b", arch(on_screen(ada, 900, 2200), on_screen(ada, 2300, 2500), 110))
     wait_settled(ada, ben)
     x, y, z = crest_of({s["id"]: s for s in ada.js("() => window.esker.strokes()")}[mountain])

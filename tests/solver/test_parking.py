@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import os
 from collections.abc import Iterator
 from typing import Any
 
@@ -22,6 +24,16 @@ from tests.solver.scenes import PINNED, SCENES, SETTINGS
 
 ROOMS = ("a", "b", "c")
 TOP = 2
+WAYS = [
+    pytest.param(base, settings, basis, id="-".join(("hills" if hilly else "flat", border, later)))
+    for (hilly, base), (border, settings), (later, basis) in itertools.product(
+        enumerate((None, hills())),
+        (("free", SETTINGS), ("pinned", PINNED)),
+        (("refined later", True), ("not refined", False)),
+    )
+    # Of three things two ways each, four cases have every pair of them; `ESKER_LONG` has all eight.
+    if bool(hilly) == (basis == (border == "free")) or os.environ.get("ESKER_LONG")
+]
 
 
 def of_room(room: str, name: str = "five") -> list[Stroke]:
@@ -88,9 +100,7 @@ def alone(solver: Solver, room: str, settings: TerrainSettings, base: Base | Non
     return found
 
 
-@pytest.mark.parametrize("basis", [True, False], ids=["refined later", "not refined"])
-@pytest.mark.parametrize("settings", [SETTINGS, PINNED], ids=["free", "pinned"])
-@pytest.mark.parametrize("base", [None, hills()], ids=["flat", "hills"])
+@pytest.mark.parametrize(("base", "settings", "basis"), WAYS)
 def test_solves_that_take_each_others_memory_at_every_pause_give_the_bits_of_solves_alone(
     kernels: Solver,
     settings: TerrainSettings,

@@ -1,3 +1,4 @@
+// SPEC U693
 import { signal } from "@preact/signals-core";
 import { expect, test } from "vitest";
 import type { OpenTerrain } from "../../src/app/open-terrain.ts";
