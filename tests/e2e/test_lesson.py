@@ -33,11 +33,9 @@ def authors(visitor: Visitor) -> list[str]:
     return [str(s["author"]) for s in visitor.js("() => window.esker.strokes()")]
 
 
-def pupil(
-    visitors: Visitors, name: str, path: str, width: int = 720, height: int = 540, on_map: bool = False
-) -> Visitor:
+def pupil(visitors: Visitors, name: str, path: str, width: int = 720, height: int = 540, **options: bool) -> Visitor:
     """Somebody who calls themself so."""
-    made = visitors(width, height, seen=not on_map, on_map=on_map)
+    made = visitors(width, height, **options)
     made.context.add_init_script(f"localStorage.setItem('esker.name', {json.dumps(name)})")
     made.open(path)
     return made
@@ -48,7 +46,7 @@ def test_a_teacher_leads_a_lesson(visitors: Visitors, server: Server) -> None:
     terrain, secret = server.create(title="Lesson")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, secret))
     path = f"/t/{terrain}#{link['secret']}"
-    teacher = pupil(visitors, "Ms Ray", f"/t/{terrain}#{secret}", width=1100, height=720)
+    teacher = pupil(visitors, "Ms Ray", f"/t/{terrain}#{secret}", width=1100, height=720, seen=True)
     anne, ben = pupil(visitors, "Anne", path), pupil(visitors, "Ben", path, 390, 780, on_map=True)
     press(teacher, "Inspector")
     teacher.page.get_by_role("radio", name="Lesson").click()

@@ -76,7 +76,7 @@ def write_the_task(teacher: Visitor) -> None:
 def test_a_whole_lesson(visitors: Visitors, server: Server) -> None:
     """SPEC L120, U690, U691."""
     terrain, secret = server.create(title="One mountain")
-    teacher = visitors(1100, 720, seen=True)
+    teacher = visitors(1100, 720)
     teacher.open(f"/t/{terrain}#{secret}")
     write_the_task(teacher)
     begun = points(teacher)
@@ -86,7 +86,7 @@ def test_a_whole_lesson(visitors: Visitors, server: Server) -> None:
     teacher.page.keyboard.press("y")
 
     made = json.loads(server.request("POST", f"/api/terrains/{terrain}/classes", {}, secret))
-    wall = visitors(1100, 720, seen=True)
+    wall = visitors(1100, 720)
     wall.page.goto(f"{server.url}/wall/{terrain}/{made['id']}#{secret}")
     ada = arrive(visitors(900, 640, seen=True), server, made["code"], "Ada")
     ben = arrive(visitors(390, 780, has_touch=True, is_mobile=True), server, made["code"], "Ben")

@@ -107,17 +107,17 @@ def check(visitor: Visitor, places: list[Point], truth: Truth) -> dict[int, int]
 
 def test_a_crest_sharpens_as_one_comes_near(visitors: Visitors, server: Server, tmp_path: Path) -> None:
     """E8: finer levels come where somebody stands, are right, and are right again after the ground has changed."""
-    ada, ben, terrain, secret = two_people(visitors, server, width=480, height=360, device_scale_factor=1)
+    ada, ben, terrain, secret = two_people(visitors, server, width=480, height=360, device_scale_factor=0.5)
     mountain = draw(ada, "b", arch(on_screen(ada, 900, 2200), on_screen(ada, 2300, 2500), 110))
     wait_settled(ada, ben)
     x, y, z = crest_of({s["id"]: s for s in ada.js("() => window.esker.strokes()")}[mountain])
     assert max(levels(ada, around((x, y), 20))) <= SOLVED
     for person in (ada, ben):
-        stand(person, terrain, [x - 30, y - 55, z + 16], [x + 6, y + 8, z - 6])
+        stand(person, terrain, [x - 15, y - 28, z + 8], [x + 3, y + 4, z - 3])
     for person in (ada, ben):
         wait_refined(person, (x, y), 7)
     ada.shot("refined-1-crest")
-    places = around((x, y), 24)
+    places = around((x, y), 12)
     before = heights(ada, places)
     seen = check(ada, places, Truth(server, terrain, secret, tmp_path))
     assert max(seen) > 6

@@ -14,7 +14,7 @@ from PIL import Image
 from esker.api.terrain import Terrain
 from esker.contract import DEFAULT_LEVEL
 from esker.grid import quantum, spacing
-from tests.e2e.conftest import Server, Visitor, Visitors, serving
+from tests.e2e.conftest import LEVEL, Server, Visitor, Visitors, serving
 from tests.e2e.hands import (
     COARSE,
     arch,
@@ -34,16 +34,16 @@ SIZE = 4096.0
 
 
 @pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    """A server that may be killed, and solves all that the product's does."""
-    yield from serving(tmp_path, DEFAULT_LEVEL)
+def server(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Server]:
+    """A server that may be killed, and solves all that the product's does unless a test asks for another level."""
+    yield from serving(tmp_path, getattr(request, "param", DEFAULT_LEVEL))
 
 
 def two_people(visitors: Visitors, server: Server) -> tuple[Visitor, Visitor, str, str]:
     """Ada owns the terrain, Ben has an edit link; both see it."""
     terrain, secret = server.create(title="Together")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit", "name": "Ben"}, secret))
-    ada, ben = visitors(seen=True), visitors(seen=True)
+    ada, ben = visitors(seen=True), visitors()
     ada.open(f"/t/{terrain}#{secret}")
     ben.open(f"/t/{terrain}#{link['secret']}")
     return ada, ben, terrain, secret
@@ -146,6 +146,7 @@ def test_two_people_sketch_one_terrain(visitors: Visitors, server: Server, tmp_p
         assert unexpected == []
 
 
+@pytest.mark.parametrize("server", [LEVEL], indirect=True)
 def test_the_ground_morphs_under_the_pen_for_both(visitors: Visitors, server: Server) -> None:
     """SPEC E1: while the stroke is still being drawn, the other page's ground has already risen."""
     ada, ben, _, _ = two_people(visitors, server)
