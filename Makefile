@@ -29,7 +29,7 @@ run: setup frontend/dist/index.html ## set up, build, start the server, print th
 	@exec $(HOLDING) $(BIN)/python -m esker serve $(ARGS)
 
 test: ## set up, then run every check and every test
-	@$(MAKE) --no-print-directory -j2 $(STAMPS)/dev browser frontend/dist/index.html
+	@$(MAKE) --no-print-directory -j3 $(STAMPS)/dev browser frontend/dist/index.html $(STAMPS)/compiled
 	@if [ -n "$(ARGS)" ]; then $(MAKE) --no-print-directory -j2 check; exec $(BIN)/python -m pytest $(ARGS); \
 	else exec $(MAKE) --no-print-directory -j$(PARTS) test-people test-rooms test-rest check test-page test-solved test-drawn; fi
 
@@ -111,6 +111,12 @@ $(VENV)/bin/python:
 	  else echo "Python's venv module is missing. On Debian: sudo apt-get install python3-venv"; exit 1; fi; }
 	@echo "Setting up Python in $(VENV) ..."
 	$(PYTHON) -m venv $(VENV)
+
+# What each server, node and reader of files would compile at its first start: once, while packages come over the network.
+$(STAMPS)/compiled: $(STAMPS)/dev
+	@echo "Compiling what servers run ..."
+	@$(BIN)/python -m tests.warm
+	@touch $@
 
 # Modules are compiled when they are first imported: all at once takes 18 s, most of it for what nobody uses.
 $(STAMPS)/python: requirements.lock pyproject.toml | $(VENV)/bin/python
