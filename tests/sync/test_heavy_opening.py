@@ -24,8 +24,10 @@ from esker.server.upload import read_archive
 from esker.store.journal import Journal
 
 STROKES, POINTS = 600, 500
-TURNS = 20
-"""Turns of the event loop that a bystander has at least while a document is read: at once it would be one or two."""
+TURNS = 200
+"""Turns of the event loop that a bystander has at least while a document is read: at once it would be 8 to 24, in pieces 9,000."""
+TRIES = 5
+"""A busy machine may keep a bystander from his processor for a whole reading, so the best of several tries counts."""
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +51,7 @@ def _as_served() -> Iterator[None]:
 def _turns_while(
     reads: list[Any], monkeypatch: pytest.MonkeyPatch, module: str, work: Callable[[], Awaitable[Any]]
 ) -> int:
-    """Turns of a bystander's loop while ``module`` reads its document."""
+    """Most turns, of several tries, of a bystander's loop while ``module`` reads its document."""
     going, turns = [False], [0]
 
     def read(text: str | bytes) -> Document:
@@ -69,9 +71,15 @@ def _turns_while(
             await asyncio.sleep(0)
         await task
 
+    best = 0
     with _as_served():
-        asyncio.run(run())
-    return turns[0]
+        for _ in range(TRIES):
+            turns[0] = 0
+            asyncio.run(run())
+            best = max(best, turns[0])
+            if best >= TURNS:
+                break
+    return best
 
 
 def test_a_bystander_has_his_turns_while_a_heavy_journal_is_opened(
@@ -83,7 +91,7 @@ def test_a_bystander_has_his_turns_while_a_heavy_journal_is_opened(
     plain = heavy.model_dump_json(exclude_defaults=True)
     journal.submit(lambda db: db.execute("UPDATE snapshots SET document=?", (plain,))).result()
     turns = _turns_while(reads, monkeypatch, "esker.store.journal", lambda: asyncio.to_thread(journal.load, "t"))
-    assert reads == [heavy]
+    assert reads[-1] == heavy
     assert turns >= TURNS
     journal.close()
 
@@ -99,7 +107,7 @@ def test_a_bystander_has_his_turns_while_a_heavy_file_is_taken_in(
     turns = _turns_while(
         reads, monkeypatch, "esker.server.upload", lambda: read_archive(tmp_path / "t.esker", work, turn)
     )
-    assert reads == [heavy]
+    assert reads[-1] == heavy
     assert turns >= TURNS
 
 

@@ -55,8 +55,8 @@ def test_the_release_page_has_a_place_for_the_log() -> None:
 
 
 def test_packages_of_the_system_are_installed_one_after_the_other() -> None:
-    """SPEC H169: `make test` makes two targets at a time, and one apt-get holds the lock that the other wants."""
+    """SPEC H169: `make test` makes several targets at a time, and one apt-get holds the lock that the other wants."""
     makefile = (ROOT / "Makefile").read_text()
-    assert "-j2 $(STAMPS)/dev browser" in makefile
+    assert re.search(r"-j\d \$\(STAMPS\)/dev browser", makefile)
     assert "apt-get" in makefile.split("$(VENV)/bin/python:\n")[1].split("\n\n")[0]
     assert re.search(r"^browser: \| \$\(VENV\)/bin/python\b", makefile, re.M)
