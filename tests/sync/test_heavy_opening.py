@@ -25,7 +25,7 @@ from esker.store.journal import Journal
 
 STROKES, POINTS = 600, 500
 TURNS = 200
-"""Turns of the event loop that a bystander has at least while a document is read: at once it would be 8 to 24, in pieces 9,000."""
+"""A bystander has so many turns at least while a document is read: at once it would be 8 to 24, in pieces 9,000."""
 TRIES = 5
 """A busy machine may keep a bystander from his processor for a whole reading, so the best of several tries counts."""
 
