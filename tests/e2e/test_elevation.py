@@ -125,7 +125,7 @@ def test_real_ground_is_dropped_sketched_on_and_refined_by_a_turned_grid(
 ) -> None:
     terrain, secret = server.create(title="Helens")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit", "name": "Ben"}, secret))
-    ada, ben = visitors(960, 640), visitors(480, 400)
+    ada, ben = visitors(960, 640), visitors(480, 400, on_map=True)
     ada.open(f"/t/{terrain}#{secret}")
     ben.open(f"/t/{terrain}#{link['secret']}")
 

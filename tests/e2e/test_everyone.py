@@ -81,7 +81,7 @@ def test_a_viewer_watches_and_cannot_draw(visitors: Visitors, server: Server) ->
     link = json.loads(
         server.request("POST", f"/api/terrains/{terrain}/links", {"role": "view", "name": "Class"}, secret)
     )
-    owner, viewer = visitors(), visitors()
+    owner, viewer = visitors(), visitors(on_map=True)
     owner.open(f"/t/{terrain}#{secret}")
     viewer.open(f"/t/{terrain}#{link['secret']}")
     assert viewer.js("() => window.esker.role()") == "view"

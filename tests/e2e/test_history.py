@@ -47,7 +47,7 @@ def entry(visitor: Visitor, text: str) -> Any:
 def test_two_people_look_back(visitors: Visitors, server: Server, tmp_path: Path) -> None:
     terrain, secret = server.create(title="Looking back")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit", "name": "Ben"}, secret))
-    ada, ben = visitors(820, 520), visitors(420, 320)
+    ada, ben = visitors(820, 520), visitors(420, 320, on_map=True)
     ada.open(f"/t/{terrain}#{secret}")
     ben.open(f"/t/{terrain}#{link['secret']}")
     ada.page.keyboard.press("Shift+H")

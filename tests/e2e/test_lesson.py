@@ -129,7 +129,7 @@ def test_groups_are_on_every_device_of_who_leads(visitors: Visitors, server: Ser
     """SPEC L160, L161: a group that is made on a laptop is given pens and a name on a tablet."""
     terrain, secret = server.create(title="Groups")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, secret))
-    laptop = pupil(visitors, "Ms Ray", f"/t/{terrain}#{secret}", width=1100, height=720)
+    laptop = pupil(visitors, "Ms Ray", f"/t/{terrain}#{secret}", width=1100, height=720, on_map=True)
     tablet = visitors(1024, 768, has_touch=True, on_map=True)
     tablet.open(f"/t/{terrain}#{secret}")
     path = f"/t/{terrain}#{link['secret']}"

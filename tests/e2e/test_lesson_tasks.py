@@ -86,7 +86,7 @@ def test_a_whole_lesson(visitors: Visitors, server: Server) -> None:
     teacher.page.keyboard.press("y")
 
     made = json.loads(server.request("POST", f"/api/terrains/{terrain}/classes", {}, secret))
-    wall = visitors(1100, 720)
+    wall = visitors(1100, 720, on_map=True)
     wall.page.goto(f"{server.url}/wall/{terrain}/{made['id']}#{secret}")
     ada = arrive(visitors(900, 640, seen=True), server, made["code"], "Ada")
     ben = arrive(visitors(390, 780, has_touch=True, is_mobile=True), server, made["code"], "Ben")

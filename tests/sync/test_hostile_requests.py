@@ -21,7 +21,7 @@ from tests.sync.test_classes import Pupil, Teacher
 
 MADE_BY_PROCESSES = ("/api/terrains/import", "/api/terrains/from-grid")
 """Routes that begin a process for each body, which takes as much as a hundred other requests."""
-MOST_PROCESSES = 250 if os.environ.get("ESKER_LONG") else 3
+MOST_PROCESSES = 250 if os.environ.get("ESKER_LONG") else 1
 """Requests to each of these routes, by each role."""
 FINE = {200, 201, 202, 204, 400, 401, 403, 404, 405, 409, 410, 411, 413, 415, 421, 422, 429, 503, 507}
 

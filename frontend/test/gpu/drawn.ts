@@ -77,7 +77,8 @@ export function drawnPatch(cut: Cut, index: number, sizeM: number, height: Sampl
       let [x, y] = [c, r];
       if ((c === 0 && edges & EDGE_WEST) || (c === PATCH_CELLS && edges & EDGE_EAST)) y -= y & 1;
       if ((r === 0 && edges & EDGE_SOUTH) || (r === PATCH_CELLS && edges & EDGE_NORTH)) x -= x & 1;
-      at.set([x, y], 2 * (r * SIDE + c));
+      at[2 * (r * SIDE + c)] = x;
+      at[2 * (r * SIDE + c) + 1] = y;
       heights[r * SIDE + c] = shownVertex(cut, index, x, y, height, corners);
     }
   }
@@ -125,12 +126,8 @@ export function samplesOf(view: TileView): Samples {
     const x = Math.min(last, Math.floor(column / TILE_CELLS));
     const y = Math.min(last, Math.floor(row / TILE_CELLS));
     // A sample on an edge belongs to whichever tile is there.
-    for (const [tx, ty] of [
-      [x, y],
-      [x - 1, y],
-      [x, y - 1],
-      [x - 1, y - 1],
-    ] as const) {
+    for (let beside = 0; beside < 4; beside += 1) {
+      const [tx, ty] = [x - (beside & 1), y - (beside >> 1)];
       const [c, r] = [column - tx * TILE_CELLS, row - ty * TILE_CELLS];
       const tile = c <= TILE_CELLS && r <= TILE_CELLS ? view.tile(level, tx, ty) : undefined;
       if (tile !== undefined) return tile.heights[r * TILE_SAMPLES + c]!;

@@ -404,12 +404,14 @@ export function craggyField(seed: number, sizeM: number): HeightField {
     f: (4 * Math.PI * 3.7 ** k) / sizeM,
     a: 0.02 * sizeM * 0.3 ** k,
     turn: seed + 1.7 * k,
+    east: Math.cos(seed + 1.7 * k),
+    north: Math.sin(seed + 1.7 * k),
   }));
   return (x, y, level) => {
     let sum = 0;
-    for (const { f, a, turn } of waves) {
-      const u = Math.cos(turn) * x + Math.sin(turn) * y;
-      const v = Math.cos(turn) * y - Math.sin(turn) * x;
+    for (const { f, a, turn, east, north } of waves) {
+      const u = east * x + north * y;
+      const v = east * y - north * x;
       sum += a * Math.sin(f * u + turn) * Math.cos(0.83 * f * v);
     }
     return sum * (1 + 0.002 * Math.sin(level * 7));

@@ -13,6 +13,8 @@ const SIZE = 4096;
 const LEVELS = 4;
 const WIDTH = 1024;
 const HEIGHT = 768;
+/** Views, from three places, with and without a sea, of two grounds: each combination once. */
+const ROUNDS = 12;
 
 const slots = { slot: (): number => 0, touch: (): void => {} };
 
@@ -137,7 +139,7 @@ describe("hidden patches", () => {
     const next = random(31);
     let ground = 0;
     const saved: Record<Place, [number, number]> = { ground: [0, 0], air: [0, 0], outside: [0, 0] };
-    for (let round = 0; round < 24; round += 1) {
+    for (let round = 0; round < ROUNDS; round += 1) {
       const view = views[round % 2]!;
       const place = (["ground", "air", "outside"] as const)[round % 3]!;
       const state = camera(place, next, view);
@@ -147,7 +149,7 @@ describe("hidden patches", () => {
       const kept = new Set(drawn(view, selection.select(view, state, tau, slots, 1, new Surfaces(null, sea))).keys());
       selection.occlusion = false;
       const all = drawn(view, selection.select(view, state, tau, slots, 1, new Surfaces(null, sea)));
-      for (const name of kept) expect(all.has(name)).toBe(true);
+      expect([...kept].filter((name) => !all.has(name))).toEqual([]);
       const names = [...all.keys()];
       const front = rasterise([...all.values()], state, { width: 256, height: 192, base: -500 });
       const seen = (index: number): boolean => index >= 0 && !kept.has(names[index]!);
@@ -156,8 +158,8 @@ describe("hidden patches", () => {
       saved[place][0] += all.size;
       saved[place][1] += kept.size;
     }
-    expect(ground).toBeGreaterThan(20 * 256 * 192 * 0.4);
+    expect(ground).toBeGreaterThan(0.8 * ROUNDS * 256 * 192 * 0.4);
     const share = (place: Place): number => 1 - saved[place][1] / saved[place][0];
-    expect(share("ground")).toBeGreaterThan(0.3);
+    expect(share("ground")).toBeGreaterThan(0.25);
   });
 });
