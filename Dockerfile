@@ -21,7 +21,7 @@ COPY requirements-cluster.lock build.in pyproject.toml README.md LICENSE NOTICE 
 RUN pip install --no-cache-dir --require-hashes -r requirements-cluster.lock
 COPY backend backend
 COPY shaders shaders
-RUN pip install --no-cache-dir --no-deps --no-build-isolation -e .
+RUN pip install --no-cache-dir --no-deps --no-build-isolation -e . && python -m compileall -q backend
 COPY --from=page /esker/frontend/dist frontend/dist
 RUN useradd --create-home esker && mkdir /data && chown esker:esker /data
 USER esker
