@@ -10,7 +10,7 @@ import pytest
 from esker import contract as c
 from esker.document.changes import changes
 from esker.document.ops import Refusal, StrokeSet
-from esker.document.takeback import Deeds, sentence
+from esker.document.takeback import Deeds, outcome
 from esker.document.undo import UndoPlan
 
 SEEDS = 120
@@ -128,7 +128,7 @@ def test_nobody_did_anything() -> None:
     document = StrokeSet("t", strokes={"s": _stroke("s", 0.0)})
     plan = Deeds({"ben"}).plan(document)
     assert plan.ops == ()
-    assert sentence("Ben", plan) == "Nothing that Ben did still stands."
+    assert outcome(plan) == "nothing_stands"
 
 
 def test_a_value_goes_back_to_what_somebody_else_wrote() -> None:

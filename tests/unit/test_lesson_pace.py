@@ -14,6 +14,7 @@ from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.document.takeback import Deeds
 from esker.fairness.shares import Who
+from esker.session.lesson.notices import SENTENCES
 from esker.session.lesson.rules import Lesson
 from esker.session.lesson.state import MOST, Removed, State
 from esker.session.room import conducting, protocol
@@ -107,7 +108,7 @@ def test_who_switched_is_told_where_it_was_not_saved() -> None:
     for written in range(2):
         room.journal.written[written][1].set_exception(OSError("no"))
     said = [json.loads(str(text)) for text in iter(room.owner.outbox.pop, None)]
-    assert [each["text"] for each in said if each["type"] == "notice"] == [conducting.UNSAVED] * 2
+    assert [each["text"] for each in said if each["type"] == "notice"] == [SENTENCES["unsaved"]] * 2
     assert [each["hands_off"] for each in said if each["type"] == "lesson"] == [True]
 
 

@@ -18,6 +18,7 @@ sys.path.insert(0, str(HERE.parent.parent))
 from tests.vectors.flow_cases import flow_vectors  # noqa: E402
 from tests.vectors.lake_cases import lake_vectors  # noqa: E402
 from tests.vectors.message_cases import message_vectors  # noqa: E402
+from tests.vectors.notice_cases import notice_vectors  # noqa: E402
 from tests.vectors.op_cases import op_vectors  # noqa: E402
 from tests.vectors.pour_cases import pour_vectors  # noqa: E402
 from tests.vectors.question_cases import question_vectors  # noqa: E402
@@ -41,6 +42,7 @@ def build() -> dict[str, str]:
         "lakes.json": text("ground in sixteenths of a metre, row 0 south -> levels of lakes, waves", lake_vectors()),
         "flow.json": text("ground in whole steps, row 0 south -> receivers, water, areas, rivers", flow_vectors()),
         "pour.json": text("ground in whole steps, water poured out -> pools and what runs off", pour_vectors()),
+        "notices.json": text("notices of a lesson, which the page has in its language", notice_vectors()),
         "questions.json": text("questions of imports, which the page has in its language", question_vectors()),
         "rivermap.json": text(
             "rivers in cells of a level -> the pieces that shaders read, by cell", rivermap_vectors()

@@ -6,8 +6,8 @@ from typing import Final
 
 # --- protocol ---------------------------------------------------------------------------------------------------
 
-PROTOCOL_VERSION: Final = 9
-SUBPROTOCOL: Final = "esker.9"
+PROTOCOL_VERSION: Final = 10
+SUBPROTOCOL: Final = "esker.10"
 
 # --- grid (DESIGN 3) --------------------------------------------------------------------------------------------
 
@@ -194,6 +194,8 @@ HISTORY_IDLE_SECONDS: Final = 600.0
 MAX_HISTORY_OPS: Final = 100_000
 """Ops that the list of the history reaches back; earlier clocks can be looked at and copied all the same."""
 MAX_HISTORY_PAGE: Final = 200
+MAX_NAMED: Final = 3
+"""People whom a sentence of the server names."""
 MAX_NAME_LENGTH: Final = 80
 UNSEEN: Final = {
     0x00: 0x1F, 0x7F: 0x9F, 0x061C: 0x061C, 0x200B: 0x200B, 0x200E: 0x200F, 0x2028: 0x202E, 0x2060: 0x206F,

@@ -152,6 +152,7 @@ def _unions() -> Iterable[str]:
         "RejectCode",
         "CloseCode",
         "AnswerCode",
+        "NoticeCode",
     ):
         values = contract.__dict__[name].__args__
         yield f"export type {name} =\n" + "\n".join(f'  | "{v}"' for v in values) + ";"

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, StringConstraints
 
-from esker.contract.constants import MAX_GROUP_NAME, MAX_GROUPED, MAX_GROUPS, MAX_PEOPLE
-from esker.contract.values import Animals, Id, Line, Name, Wire, plain
+from esker.contract.constants import MAX_GROUP_NAME, MAX_GROUPED, MAX_GROUPS, MAX_NAME_LENGTH, MAX_NAMED, MAX_PEOPLE
+from esker.contract.values import Animals, Id, Name, Wire, plain
 
 PersonAction = Literal["pen", "no_pen", "conductor", "no_conductor", "remove", "let_in", "undo"]
 GroupName = Annotated[str, StringConstraints(max_length=MAX_GROUP_NAME), AfterValidator(plain)]
@@ -81,11 +81,34 @@ class Outsider(Wire):
     name: Name
 
 
+NoticeCode = Literal[
+    "not_leading",
+    "owners_only",
+    "not_owners",
+    "not_leaders",
+    "not_yourself",
+    "nobody",
+    "unsaved",
+    "undo_busy",
+    "unreadable",
+    "too_many_groups",
+    "too_many_grouped",
+    "taken_back",
+    "taken_back_but",
+    "nothing_stands",
+    "nothing_taken_back",
+    "refused",
+]
+
+
 class Notice(Wire):
-    """A sentence for one person about the lesson: what became of what they asked for."""
+    """A sentence for one person about the lesson: what became of what they asked for. Pages of another language make
+    theirs of ``code`` and of the ``names`` of whom it tells."""
 
     type: Literal["notice"] = "notice"
-    text: Line
+    code: NoticeCode
+    names: Annotated[tuple[Name, ...], Field(max_length=MAX_NAMED)] = ()
+    text: Annotated[str, StringConstraints(max_length=MAX_NAMED * MAX_NAME_LENGTH + 240), AfterValidator(plain)]
 
 
 class Lesson(Wire):

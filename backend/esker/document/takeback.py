@@ -19,7 +19,6 @@ from esker.document.revert import LayerReverter, StrokeReverter, grouped
 from esker.document.undo import UndoPlan, plan
 
 Key = tuple[Kind, str]
-KEPT: Final = "What others have changed since was kept."
 REVERTERS: Final[dict[Kind, type[StrokeReverter] | type[LayerReverter]]] = {
     "stroke": StrokeReverter,
     "layer": LayerReverter,
@@ -128,9 +127,8 @@ def _key(part: c.SimpleOp) -> Key:
             return "stroke", part.stroke
 
 
-def sentence(name: str, result: UndoPlan) -> str:
-    """What was taken back, for whoever asked."""
+def outcome(result: UndoPlan) -> c.NoticeCode:
+    """What is told to whoever asked for it."""
     if not result.ops:
-        return f"Nothing that {name} did still stands." if not result.skipped else f"{KEPT} Nothing was taken back."
-    kept = "" if not result.skipped else f" {KEPT}"
-    return f"Everything that {name} did was taken back.{kept}"
+        return "nothing_taken_back" if result.skipped else "nothing_stands"
+    return "taken_back_but" if result.skipped else "taken_back"

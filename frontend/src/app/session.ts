@@ -42,6 +42,7 @@ import { type Status, status } from "./status.ts";
 import { ToastList } from "./toasts.ts";
 import type { People } from "./view/scene.ts";
 import { Stage } from "./view/stage.ts";
+import { noticeWords } from "./words/notices.ts";
 import { refusalWords } from "./words/refusals.ts";
 
 export class TerrainSession implements OpenTerrain {
@@ -359,7 +360,7 @@ export class TerrainSession implements OpenTerrain {
         this.score.value = (message.points ?? null) === null ? null : message;
         break;
       case "notice":
-        this.toasts.show(message.text);
+        this.toasts.show(noticeWords(message));
         break;
       case "pong":
         break;

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final
 
 from esker import contract as c
 from esker.contract import Grouping, PenGroup
 from esker.session.lesson.state import with_people, without
 
-MANY_GROUPS: Final = f"A lesson has at most {c.MAX_GROUPS} groups. Forget one first."
-MANY_PEOPLE: Final = f"The groups of a lesson hold at most {c.MAX_GROUPED} people together. Take somebody out first."
-
 Groups = tuple[PenGroup, ...]
 
 
-def changed(groups: Groups, order: Grouping) -> Groups | str:
-    """The groups after an order about one of them, or about the pens of all; or why it cannot be, as a sentence.
+def changed(groups: Groups, order: Grouping) -> Groups | c.NoticeCode:
+    """The groups after an order about one of them, or about the pens of all; or the notice that says why it cannot be.
 
     An order about a group that is not there makes it where it says a name, and does nothing where it says none: a
     conductor may change what another one has just forgotten.
@@ -29,11 +25,11 @@ def changed(groups: Groups, order: Grouping) -> Groups | str:
         if order.name is None:
             return groups
         if len(groups) >= c.MAX_GROUPS:
-            return MANY_GROUPS
+            return "too_many_groups"
         groups = (*groups, PenGroup(id=order.group))
     put = frozenset(order.put)
     after = tuple(_ordered(each, order) if each.id == order.group else _left(each, put) for each in groups)
-    return MANY_PEOPLE if sum(len(each.people) for each in after) > c.MAX_GROUPED else after
+    return "too_many_grouped" if sum(len(each.people) for each in after) > c.MAX_GROUPED else after
 
 
 def leaving(groups: Groups, people: Iterable[str]) -> Groups:

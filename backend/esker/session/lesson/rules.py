@@ -27,10 +27,6 @@ TASK_FIELDS: Final = frozenset({"task", "task_pictures"})
 """Settings that only conductors change, protected or not."""
 MOST_WAITING: Final = 50
 """The server remembers so many people who ask to be let in."""
-NO_CHANGE: Final = "Only whoever leads the lesson may do this."
-OWNERS_ONLY: Final = "Only an owner of the terrain may say who else leads."
-NOT_OWNERS: Final = "An owner of the terrain cannot be sent out. Their link can be revoked."
-NOT_LEADERS: Final = "Only an owner may send out somebody who leads too."
 
 
 class Somebody(Protocol):
@@ -245,8 +241,8 @@ class Lesson:
                 return self._named({"removed": removed, "let_in": with_people(state.let_in, people)})
         return state
 
-    def grouped(self, message: c.Grouping) -> State | str:
-        """The state after what a conductor changed of groups; or why that cannot be."""
+    def grouped(self, message: c.Grouping) -> State | c.NoticeCode:
+        """The state after what a conductor changed of groups; or the notice that says why that cannot be."""
         state = self.state
         after = groups.changed(state.groups, message)
         if isinstance(after, str):

@@ -20,9 +20,10 @@ from typing import Final
 from esker import contract as c
 from esker.contract import Role
 from esker.document.ops import Refusal
-from esker.document.takeback import Deeds, sentence
+from esker.document.takeback import Deeds, outcome
 from esker.fairness.shares import Who, homes
-from esker.session.lesson.rules import NO_CHANGE, NOT_LEADERS, NOT_OWNERS, OWNERS_ONLY, REMOVED
+from esker.session.lesson.notices import notice
+from esker.session.lesson.rules import REMOVED
 from esker.session.lesson.state import Removed, State
 from esker.session.room.core import RoomCore
 from esker.session.room.entry import Denied
@@ -40,9 +41,6 @@ MOST_GONE: Final = 200
 TELL_SECONDS: Final = 0.25
 """Everybody is told how the lesson stands at most this often, the first time at once; conductors, who waits to be let
 in: a lesson may be switched, and who was removed may knock, hundreds of times a second."""
-UNSAVED: Final = "The server could not save this (is its disk full?). It holds until the server stops."
-BUSY: Final = "What somebody did is being taken back already. Try again in a moment."
-UNREADABLE: Final = "The history could not be read, so nothing was taken back."
 
 
 @dataclass(frozen=True)
@@ -168,7 +166,7 @@ class Conducting:
     def receive(self, member: Member, message: c.Conduct | c.People | c.Grouping) -> None:
         """Does what a member asks, if they may."""
         if not self._core.lesson.conducts(member):
-            member.outbox.message(c.Notice(text=NO_CHANGE))
+            member.outbox.message(notice("not_leading"))
             return
         if isinstance(message, c.Conduct):
             self._switch(member, message)
@@ -179,7 +177,7 @@ class Conducting:
         elif message.action == "remove":
             self._remove(member, message.people)
         elif message.action in ("conductor", "no_conductor") and member.role != "owner":
-            member.outbox.message(c.Notice(text=OWNERS_ONLY))
+            member.outbox.message(notice("owners_only"))
         else:
             self._change(self._core.lesson.turned(message), member)
 
@@ -197,7 +195,7 @@ class Conducting:
         lesson = self._core.lesson
         state = lesson.grouped(message)
         if isinstance(state, str):
-            member.outbox.message(c.Notice(text=state))
+            member.outbox.message(notice(state))
         elif state.pens != lesson.state.pens:
             self._change(state, member)
         elif state.groups != lesson.state.groups:
@@ -236,7 +234,7 @@ class Conducting:
         if error is not None:
             log.error("terrain %s: the state of its lesson was not saved: %s", self._core.document.id, error)
             for member in dict.fromkeys(by):
-                member.outbox.message(c.Notice(text=UNSAVED))
+                member.outbox.message(notice("unsaved"))
         if self._is_newer:
             self._keep(())
         elif self._all or self._some:
@@ -266,13 +264,13 @@ class Conducting:
             here = [m for m in core.members if m.person == person]
             ways: list[Member | _Gone] = [*here, *([self._gone[person]] if person in self._gone else [])]
             if not ways:
-                by.outbox.message(c.Notice(text="Nobody like that is here, or was here a while ago."))
+                by.outbox.message(notice("nobody"))
                 continue
             if any(way.role == "owner" for way in ways) or person == by.person:
-                by.outbox.message(c.Notice(text=NOT_OWNERS if person != by.person else "You cannot send yourself out."))
+                by.outbox.message(notice("not_owners" if person != by.person else "not_yourself"))
                 continue
             if by.role != "owner" and person in lesson.state.conductors:
-                by.outbox.message(c.Notice(text=NOT_LEADERS))
+                by.outbox.message(notice("not_leaders"))
                 continue
             now = int((self._desk.now() if self._desk is not None else time.time()) * 1000)
             addresses = {homes(way.address)[0] for way in ways}
@@ -293,7 +291,7 @@ class Conducting:
 
     def _undo(self, by: Member, people: tuple[str, ...]) -> None:
         if self._desk is None or (self._undoing is not None and not self._undoing.done()):
-            by.outbox.message(c.Notice(text=BUSY))
+            by.outbox.message(notice("undo_busy"))
             return
         self._undoing = asyncio.ensure_future(self._take_back(by, people, self._desk))
 
@@ -312,7 +310,7 @@ class Conducting:
             deeds = await desk.read(who, lambda: read_deeds(self._journal, core.document.id, clients))
         except (DamagedTerrain, Denied) as error:
             log.error("terrain %s: nothing was taken back: %s", core.document.id, error)
-            by.outbox.message(c.Notice(text=UNREADABLE))
+            by.outbox.message(notice("unreadable"))
             return
         result = deeds.plan(core.head)
         agent = _agent()
@@ -320,13 +318,13 @@ class Conducting:
             for number, op in enumerate(result.ops):
                 core.perform(op, agent, by.client, number)
         except Refusal as refusal:
-            by.outbox.message(c.Notice(text=refusal.message))
+            by.outbox.message(notice("refused").model_copy(update={"text": refusal.message}))
         self._ordered()
         await self._flushed()
         names = {m.name for m in core.members if m.person in people} | {
             self._gone[each].name for each in people if each in self._gone
         }
-        by.outbox.message(c.Notice(text=sentence(" and ".join(sorted(filter(None, names))[:3]) or "they", result)))
+        by.outbox.message(notice(outcome(result), names))
 
     def close(self) -> None:
         """Stops the timer, and what is being taken back."""
