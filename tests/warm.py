@@ -7,6 +7,7 @@ while packages still come over the network; tests of first starts have empty fol
 from __future__ import annotations
 
 import asyncio
+from concurrent.futures import ThreadPoolExecutor
 from threading import Event
 
 from esker.importing import warm
@@ -15,10 +16,14 @@ from esker.solve.solver import Solver
 
 
 def main() -> None:
-    """Kernels of the solver, loops of tiles and rivers, and those that readers of files run."""
-    Solver()
-    first_build.have_loops(Event(), Event())
-    first_build.have_river_loops(Event())
+    """Kernels of the solver, loops of tiles and rivers; beside them those of layers and of readers of files."""
+    with ThreadPoolExecutor(1) as beside:
+        layers = beside.submit(first_build.have_layer_loops, Event())
+        Solver()
+        first_build.have_loops(Event(), Event())
+        first_build.have_river_loops(Event())
+        layers.result()
+    # After those of layers, of which readers run some: none is compiled twice.
     asyncio.run(warm.loops())
 
 

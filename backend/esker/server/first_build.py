@@ -1,6 +1,6 @@
 """Compiles, in a process of its own, what a server runs.
 
-``python -m esker.server.first_build kernels | driver | loops [tiles | rivers]`` is that process.
+``python -m esker.server.first_build kernels | driver | loops [tiles | rivers | layers]`` is that process.
 A compiler that hangs, takes all memory or aborts then harms nobody (``solve.prepare`` starts this and bounds it). What
 is compiled is kept on disk by PoCL and by numba, and whoever starts this process only loads it.
 
@@ -37,6 +37,7 @@ from esker.solve.opencl.pocl import cpu, home
 
 TILES: Final = "tiles"
 RIVERS: Final = "rivers"
+LAYERS: Final = "layers"
 SCENE_LEVEL: Final = 2
 ROWS: Final = "1-1-1-goffs0-smallgrid"
 """The name that PoCL gives the shape of the launches of row-wise kernels."""
@@ -152,7 +153,7 @@ def _blend(device: Any) -> None:
 
 
 def loops(what: str = TILES) -> dict[str, Any]:
-    """Compiles the loops of tiles, which every server runs before anybody draws, or those of its rivers."""
+    """Compiles the loops of tiles, which every server runs before anybody draws, those of its rivers, or of layers."""
     for warm in _parts(what):
         warm()
     return {"loops": what}
@@ -161,10 +162,15 @@ def loops(what: str = TILES) -> dict[str, Any]:
 def _parts(what: str) -> list[Callable[[], None]]:
     """Returns what runs the loops. Raises KeyError for something else."""
     from esker.flow import warming
+    from esker.patchwork import warming as layering
     from esker.synthesis.rules import octave
     from esker.tiles import pyramid
 
-    parts: dict[str, list[Callable[[], None]]] = {TILES: [pyramid.warm], RIVERS: [warming.warm, octave.warm]}
+    parts: dict[str, list[Callable[[], None]]] = {
+        TILES: [pyramid.warm],
+        RIVERS: [warming.warm, octave.warm],
+        LAYERS: [layering.warm],
+    }
     return parts[what]
 
 
@@ -183,6 +189,15 @@ def have_river_loops(stopped: threading.Event) -> None:
     Nobody waits for these to draw: a server is ready without them, and its first rivers come after.
     """
     _compiled(RIVERS, stopped, lambda: None)
+
+
+def have_layer_loops(stopped: threading.Event) -> None:
+    """Compiles the loops of elevation layers in a child process, unless one has done so.
+
+    Where nobody lays a layer nobody needs them. Compiled by the server itself they would hold its interpreter for a
+    minute, and everybody's strokes with it.
+    """
+    _compiled(LAYERS, stopped, lambda: None)
 
 
 def _compiled(what: str, stopped: threading.Event, begins: Callable[[], None]) -> bool:

@@ -178,6 +178,7 @@ class Assembly:
         self.port = int(self._listener.getsockname()[1])
         self._worker: Worker | None = None
         self._tiles: _Tiles | None = None
+        self._elevation: Elevation | None = None
         self._journal: Journal | None = None
         self._storing: Storing | None = None
         self._server: _Server | None = None
@@ -214,6 +215,7 @@ class Assembly:
         if not confinement.possible():
             log.warning("this system cannot keep readers of people's files from the data folder and the network")
         self._tiles = _Tiles()
+        self._elevation = Elevation(self._grids, first_build.have_layer_loops)
         self._gauges = _gauges(settings)
         codes = None if member is None else member.codes(self._journal)
         self.hub = Hub(
@@ -225,7 +227,7 @@ class Assembly:
             finest=settings.refine,
             limits=Limits(settings.max_strokes, settings.max_points),
             max_members=settings.max_members,
-            elevation=Elevation(self._grids),
+            elevation=self._elevation,
             claims=Claims(key_in(settings.data) if member is None else member.claims, self._journal.now),
             tenancy=None if member is None else member.cluster,
             meter=self._gauges,
@@ -344,6 +346,8 @@ class Assembly:
         """Stops the threads, commits what is queued, frees the port."""
         if self._care is not None:
             self._care.stop()
+        if self._elevation is not None:
+            self._elevation.close()
         if self._worker is not None:
             self._worker.stop()
         if self._tiles is not None:

@@ -1,0 +1,84 @@
+"""Loops of elevation layers are compiled by a child before the first base (SPEC H564)."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from esker import contract as c
+from esker.patchwork import warming
+from esker.patchwork.raster import rasters
+from esker.server import first_build
+from esker.server.elevation import Elevation
+from esker.solve.opencl import prepare
+from esker.solve.opencl.pocl import home
+from esker.store.grids import GridStore
+
+
+@pytest.fixture
+def laid(tmp_path: Path) -> tuple[GridStore, c.Layer]:
+    """A store, and a layer whose grid is in it."""
+    store, raster = GridStore(tmp_path), rasters.build(np.add.outer(np.arange(40.0), np.arange(50.0)))
+    store.put(raster)
+    place: dict[str, Any] = {"anchor": (900.0, 900.0), "spacing_m": (10.0, 10.0)}
+    return store, c.Layer(id="a", content=raster.digest, facts=raster.facts(), **place)
+
+
+def test_they_are_compiled_once_on_a_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    asked: list[list[str]] = []
+
+    def bounded(arguments: list[str], look: Callable[[], None] = lambda: None, stopped: Any = None) -> dict[str, Any]:
+        del look, stopped
+        asked.append(arguments)
+        return {"loops": arguments[-1]}
+
+    monkeypatch.setattr(prepare, "bounded", bounded)
+    monkeypatch.setattr(home, "root", lambda: tmp_path)
+    for _ in range(2):
+        first_build.have_layer_loops(threading.Event())
+    assert asked == [["loops", "layers"]]
+
+
+def test_what_the_child_runs_is_ground() -> None:
+    """Two layers at an angle, one with a hole: were they refused, nothing would be compiled."""
+    warming.warm()
+
+
+def test_the_first_base_waits_for_them_and_later_ones_do_not(laid: tuple[GridStore, c.Layer]) -> None:
+    store, layer = laid
+    asked: list[threading.Event] = []
+    elevation = Elevation(store, asked.append)
+    assert elevation.base((), 4096.0) is None
+    assert asked == [], "nobody has laid anything"
+    for _ in range(2):
+        assert elevation.base((layer,), 4096.0) is not None
+    assert len(asked) == 1
+
+
+def test_a_close_ends_them_and_the_base_that_waits(laid: tuple[GridStore, c.Layer]) -> None:
+    store, layer = laid
+    begun = threading.Event()
+
+    def compile_them(closed: threading.Event) -> None:
+        begun.set()
+        assert closed.wait(60)
+
+    elevation = Elevation(store, compile_them)
+    raised: list[str] = []
+
+    def make() -> None:
+        with pytest.raises(RuntimeError) as error:
+            elevation.base((layer,), 4096.0)
+        raised.append(str(error.value))
+
+    thread = threading.Thread(target=make)
+    thread.start()
+    assert begun.wait(60)
+    elevation.close()
+    thread.join(60)
+    assert raised == ["the server is stopping"]
