@@ -25,7 +25,7 @@ def laid(tmp_path: Path) -> tuple[GridStore, c.Layer]:
     """A store, and a layer whose grid is in it."""
     store, raster = GridStore(tmp_path), rasters.build(np.add.outer(np.arange(40.0), np.arange(50.0)))
     store.put(raster)
-    place: dict[str, Any] = {"anchor": (900.0, 900.0), "spacing_m": (10.0, 10.0)}
+    place: dict[str, Any] = {"anchor": (900.0, 900.0), "spacing_m": (10.0, 10.0), "accuracy_m": 1.0}
     return store, c.Layer(id="a", content=raster.digest, facts=raster.facts(), **place)
 
 
