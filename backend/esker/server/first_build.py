@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from esker import grid
 from esker.contract import TerrainSettings
 from esker.events import Done
-from esker.process import system
+from esker.process import priority, system
 from esker.process.child_process import end_with_parent
 from esker.solve.opencl import prepare, proof
 from esker.solve.opencl.pocl import cpu, home
@@ -195,7 +195,7 @@ def have_layer_loops(stopped: threading.Event) -> None:
     """Compiles the loops of elevation layers in a child process, unless one has done so.
 
     Where nobody lays a layer nobody needs them. Compiled by the server itself they would hold its interpreter for a
-    minute, and everybody's strokes with it.
+    minute, and everybody's strokes with it. The child yields to others.
     """
     _compiled(LAYERS, stopped, lambda: None)
 
@@ -234,6 +234,8 @@ def main(arguments: list[str]) -> int:
     prepare.THIS_IS_THE_CHILD = True
     try:
         if arguments[:1] == ["loops"]:
+            if arguments[1:] == [LAYERS]:
+                priority.yield_to_others()  # people draw meanwhile
             done = loops(*arguments[1:])
         else:
             given = json.loads(arguments[1])
