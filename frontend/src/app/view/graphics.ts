@@ -155,7 +155,10 @@ export class Graphics {
       return;
     }
     this.#renderer = renderer;
-    this.info.value = { kind: renderer.kind, description: renderer.description, software: renderer.software };
+    const { kind, software } = renderer;
+    // What a device calls itself is the same in all languages.
+    const description = kind === "map" ? msg("2D map") : renderer.description;
+    this.info.value = { kind, description, software };
     void renderer.lost.then((reason) => this.#lost(renderer, reason));
     this.#options.onOpened();
   }

@@ -1299,6 +1299,7 @@
 'sd694125e2ae1c996': str`Etwa ${0}, fertig in ${1}.`,
 'sd69ef61a4e31720c': `Niemand weiß, ob das geschehen ist. Sieh nach, bevor du es noch einmal versuchst.`,
 'sd6b0924883116f16': `Inselkette`,
+'sd6db4e1d7dd90895': `2D-Karte`,
 'sd77b2b9caba7f5b4': str`Die Höhen reichen bis ${0} m von null weg; ein Gelände von ${1} m Breite fasst ${2} m. Um ${3} m anheben? So wie sie ist, braucht die Datei ein Gelände von mindestens ${4} m Breite.`,
 'sd781d33b11861458': str`${0}, über den du gekommen bist, ersetzen?${1} Diese Seite behält den neuen; alle anderen mit dem alten sind ausgesperrt.`,
 'sd7c31842c1754f53': `Dieses Gelände zieht auf einen anderen Server um.`,

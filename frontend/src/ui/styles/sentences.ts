@@ -67,10 +67,11 @@ export const sentenceStyles = css`
   .notice .icon {
     color: var(--esk-accent-text);
   }
+  /* Over a hint of two lines. */
   esk-toasts {
     position: absolute;
     left: 50%;
-    bottom: 116px;
+    bottom: 140px;
     width: max-content;
     max-width: calc(100% - 2 * var(--edge));
     transform: translateX(-50%);
