@@ -6,13 +6,15 @@ import asyncio
 import json
 from collections.abc import Callable
 from concurrent.futures import Future
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from esker import contract as c
-from esker.document.ops import StrokeSet
+from esker.document.ops import Refusal, StrokeSet
 from esker.document.takeback import Deeds
+from esker.document.undo import UndoPlan
 from esker.fairness.shares import Who
 from esker.session.lesson.notices import SENTENCES
 from esker.session.lesson.rules import Lesson
@@ -224,6 +226,36 @@ def test_a_full_room_is_told_of_its_members_at_a_pace(hide: bool) -> None:
     members.tick(1.0 + LIST_SECONDS)
     assert json.loads(str(core.members.by_client["c99"].outbox.pop()))["members"][0]["name"] == "another"
     assert not members.pending
+
+
+def test_who_asked_is_told_where_not_all_could_be_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC L165: nobody is told that everything was taken back where an op was refused on the way."""
+    room = Room()
+
+    async def read(who: Who, work: Callable[[], Deeds]) -> Any:
+        del who, work
+        return SimpleNamespace(plan=lambda _: UndoPlan((c.DeleteStroke(stroke="gone"),), ()))
+
+    async def run() -> None:
+        async def flush() -> None:
+            pass
+
+        made: Any = Conducting
+        conducting = made(
+            room.core, room.journal, asyncio.get_running_loop(), Desk(read, lambda _: None),
+            ordered=lambda: None, flush=flush, people_changed=lambda: None,
+        )  # fmt: skip
+        conducting.receive(room.owner, c.People(action="undo", people=("somebody",)))
+        await asyncio.sleep(0.05)
+        conducting.close()
+
+    def refused(*_: object) -> None:
+        raise Refusal("unknown_stroke", "There is no such stroke.")
+
+    monkeypatch.setattr(room.core, "perform", refused)
+    asyncio.run(run())
+    said = [json.loads(str(text)) for text in iter(room.owner.outbox.pop, None)]
+    assert [each["code"] for each in said if each["type"] == "notice"] == ["refused"]
 
 
 def test_what_is_read_to_take_back_counts_for_who_asks() -> None:

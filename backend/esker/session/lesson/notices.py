@@ -24,7 +24,7 @@ SENTENCES: Final[dict[c.NoticeCode, str]] = {
     "taken_back_but": "Everything that {who} did was taken back. " + KEPT,
     "nothing_stands": "Nothing that {who} did still stands.",
     "nothing_taken_back": KEPT + " Nothing was taken back.",
-    "refused": "This could not be taken back.",
+    "refused": "Not everything that {who} did could be taken back.",
 }
 """The English sentence of each code. ``{who}``: names of people."""
 

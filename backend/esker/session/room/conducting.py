@@ -313,18 +313,19 @@ class Conducting:
             by.outbox.message(notice("unreadable"))
             return
         result = deeds.plan(core.head)
-        agent = _agent()
+        said, agent = outcome(result), _agent()
         try:
             for number, op in enumerate(result.ops):
                 core.perform(op, agent, by.client, number)
         except Refusal as refusal:
-            by.outbox.message(notice("refused").model_copy(update={"text": refusal.message}))
+            log.warning("terrain %s: not all was taken back: %s", core.document.id, refusal.message)
+            said = "refused"
         self._ordered()
         await self._flushed()
         names = {m.name for m in core.members if m.person in people} | {
             self._gone[each].name for each in people if each in self._gone
         }
-        by.outbox.message(notice(outcome(result), names))
+        by.outbox.message(notice(said, names))
 
     def close(self) -> None:
         """Stops the timer, and what is being taken back."""

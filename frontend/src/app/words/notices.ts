@@ -3,10 +3,9 @@
 import { msg, str } from "@lit/localize";
 import { language } from "../../core/language.ts";
 import { MAX_GROUPED, MAX_GROUPS, type Notice, type NoticeCode } from "../../generated/contract.ts";
-import { refusalWords } from "./refusals.ts";
 
 /** A sentence for each code (SPEC L165). `who`: the people of whom it tells. */
-const sentences = (who: string): Readonly<Record<Exclude<NoticeCode, "refused">, string>> => ({
+const sentences = (who: string): Readonly<Record<NoticeCode, string>> => ({
   not_leading: msg("Only whoever leads the lesson may do this."),
   owners_only: msg("Only an owner of the terrain may say who else leads."),
   not_owners: msg("An owner of the terrain cannot be sent out. Their link can be revoked."),
@@ -22,12 +21,12 @@ const sentences = (who: string): Readonly<Record<Exclude<NoticeCode, "refused">,
   taken_back_but: msg(str`Everything that ${who} did was taken back. What others have changed since was kept.`),
   nothing_stands: msg(str`Nothing that ${who} did still stands.`),
   nothing_taken_back: msg("What others have changed since was kept. Nothing was taken back."),
+  refused: msg(str`Not everything that ${who} did could be taken back.`),
 });
 
 /** The sentence for a person. In English it is the server's own; so it is of codes of a newer server. */
 export function noticeWords({ code, names, text }: Notice): string {
   if (language() === "en") return text;
-  if (code === "refused") return refusalWords(code, text);
   const who = names.length === 0 ? msg("they") : new Intl.ListFormat(language()).format(names);
   const known: Readonly<Record<string, string>> = sentences(who);
   return known[code] ?? text;

@@ -140,6 +140,7 @@
 's106ba073fe894bd6': `Hier beginnt die Liste. Der Regler geht bis zum Anfang zurück.`,
 's106c22a440dd2c96': `Schulgeräte`,
 's1133733f81750b51': `Das Grafikgerät ging verloren. Die 3D-Ansicht wird wieder geöffnet …`,
+'s114669a86653e8d7': str`Nicht alles von ${0} konnte rückgängig gemacht werden.`,
 's1193edad16fa0b51': `Längere Seite, mm`,
 's11a0c267b4e6db4d': `Was das Meer bedeckt`,
 's11c74ddc5e28f321': `Delta`,
