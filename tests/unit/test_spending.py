@@ -6,6 +6,7 @@ import asyncio
 import json
 import struct
 import time
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -167,7 +168,7 @@ def test_messages_that_take_long_end_the_connection_and_no_more_of_it_is_read(mo
         wire.server.listen(slow)
         for _ in range(200):
             wire.server.data_received(text_frame("x"))
-            rested(wire)
+            await rested(wire)
         assert broke == [True]
         calm, strained = (1 - MUCH) * MEMBER.burst, MUCH * MEMBER.burst
         assert len(heard) == pytest.approx(calm / 0.012 + strained / (0.012 * STRAINED_PRICE), abs=2)
@@ -177,11 +178,13 @@ def test_messages_that_take_long_end_the_connection_and_no_more_of_it_is_read(mo
     asyncio.run(run())
 
 
-def rested(wire: Wire) -> None:
-    """Ends the rest that the connection has, if it has one."""
-    if wire.server._turn is not None:
+async def rested(wire: Wire) -> None:
+    """Ends what the connection waits for, a lap of the event loop after the other."""
+    await asyncio.sleep(0)
+    while wire.server._turn is not None:
         wire.server._turn.cancel()
         wire.server._go_on()
+        await asyncio.sleep(0)
 
 
 class Noting:
@@ -206,23 +209,63 @@ def test_a_connection_that_has_taken_much_rests_longer_and_after_less(monkeypatc
         wire, _, broke = await _member()
 
         def slow(_: str | bytes) -> None:
-            clock.used += 0.003
+            clock.used += 0.0025
 
         wire.server.listen(slow)
         noting = Noting()
         monkeypatch.setattr(wire.server, "loop", noting)
         rests = []
         while not broke:
-            wire.server.data_received(text_frame("x") * 2)
-            rested(wire)
+            wire.server.data_received(text_frame("x"))
+            await rested(wire)
             rests.append(max(noting.asked))
             noting.asked = [0.0]
-        calm = int((1 - MUCH) * MEMBER.burst / 0.006)
+        calm = int((1 - MUCH) * MEMBER.burst / 0.0025)
         assert rests[: calm - 1] == [0.0] * (calm - 1), "somebody who draws much, or comes again"
         strained = rests[calm + 1 : -1]
-        assert strained[:40] == pytest.approx([0.003 * STRAINED_REST] * 40), "one a turn"
-        assert min(strained) >= 0.99 * 0.003 * STRAINED_REST, "and longer yet when the address has taken much as well"
+        assert strained[:40] == pytest.approx([0.0025 * STRAINED_REST] * 40), "one a turn"
+        assert min(strained) >= 0.99 * 0.0025 * STRAINED_REST, "and longer yet when the address has taken much as well"
         wire.server.connection_lost(None)
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(("seconds", "least", "most"), [(0.002, 2, 2), (0.0005, 6, 9)])
+def test_connections_of_an_address_share_each_lap_of_the_event_loop(
+    seconds: float, least: int, most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC P661: what forty pages of one address send at once took 100 ms of one lap, which all others waited for."""
+
+    async def run() -> None:
+        clock, accounts, heard = Clock(monkeypatch), Accounts(), []
+        pages = [(await _member(accounts.member("192.0.2.1")))[0] for _ in range(40)]
+        other, others, _ = await _member(accounts.member("192.0.2.2"))
+
+        def slow(page: int) -> Callable[[str | bytes], None]:
+            def listen(_: str | bytes) -> None:
+                heard.append(page)
+                clock.used += seconds
+
+            return listen
+
+        for n, page in enumerate(pages):
+            page.server.listen(slow(n))
+        await asyncio.sleep(0)
+        for n in range(2):
+            for page in pages:
+                page.server.data_received(text_frame("x"))
+            assert n == 0 or least <= len(heard) <= most, "what a page takes is known from the first time"
+            other.server.data_received(text_frame("y"))
+            while len(heard) < 40:
+                before = len(heard)
+                await asyncio.sleep(0)
+                assert n == 0 or len(heard) - before <= most
+            assert heard == list(range(40)), "in the order in which they came"
+            heard.clear()
+            await asyncio.sleep(0)
+        assert others == ["y", "y"], "another address does not wait for them"
+        for wire in (*pages, other):
+            wire.server.connection_lost(None)
 
     asyncio.run(run())
 

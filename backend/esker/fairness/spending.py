@@ -1,4 +1,5 @@
-"""What connections and requests may take of the event loop's processor time (decisions 31, 45). Pure: times come in.
+"""What connections and requests may take of the event loop's processor time (decisions 31, 45). Times come in; laps
+of the event loop are counted (``fairness/laps.py``).
 
 Every connection has a purse that fills at a rate, and pays what its bytes cost before and after they are read. The
 connections of one address, and of one IPv6 /48, pay into shared purses as well: when one of those is empty, the
@@ -8,6 +9,7 @@ by their address alone, and wait where it cannot (``server/wire/pacing.py``).
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections import OrderedDict
 from collections.abc import Callable
@@ -15,6 +17,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
+from esker.fairness.laps import Laps, LapShare, Waiting
 from esker.fairness.shares import MOST_KEYS, Rate, Who
 
 K = TypeVar("K")
@@ -119,12 +122,59 @@ class _Kind:
 _STRANGER, _MEMBER, _ASKER = _Kind(STRANGER, STRANGERS), _Kind(MEMBER, MEMBERS), _Kind(ASKERS, ASKERS)
 
 
+class Crowd:
+    """The connections of one address: their share of each lap, and the pace at which they are read where they have
+    taken much."""
+
+    __slots__ = ("lap", "pace")
+
+    def __init__(self, laps: Laps) -> None:
+        self.lap, self.pace = LapShare(laps), Purse(PACE)
+
+
 class Account:
     """The purse of one connection, with those that it shares."""
 
-    def __init__(self, shared: tuple[Purse, ...] = (), kind: _Kind = _STRANGER, pace: Purse | None = None) -> None:
-        """``pace``: what all connections of the address are read at where they have taken much (default: its own)."""
-        self._own, self._shared, self._pace = Purse(kind.own), shared, pace or Purse(PACE)
+    def __init__(self, shared: tuple[Purse, ...] = (), kind: _Kind = _STRANGER, crowd: Crowd | None = None) -> None:
+        """``crowd``: the connections of its address (default: it is the only one)."""
+        self._own, self._shared, self._crowd = Purse(kind.own), shared, crowd or Crowd(Laps())
+        self._usual = 0.0
+        """What reading it takes of late, seconds."""
+
+    def left(self) -> float:
+        """Returns the seconds for which it may be read in this lap of the event loop, 0 where it has to wait in line.
+        Called in an event loop, as is what follows."""
+        return self._crowd.lap.left(self._is_small)
+
+    def wait(self, call: Callable[[], None]) -> Waiting:
+        """Calls ``call`` when it may be read, in a later lap."""
+        return self._crowd.lap.wait(self._is_small, call)
+
+    async def turn(self) -> None:
+        """Waits until it may be read."""
+        if self.left() > 0:
+            return
+        begun = asyncio.get_running_loop().create_future()
+
+        def begin() -> None:  # a lap later: as much is kept for it
+            self._crowd.lap.take(self._usual)
+            if not begun.done():
+                begun.set_result(None)
+
+        waiting = self.wait(begin)
+        try:
+            await begun
+        finally:
+            waiting.cancel()
+
+    def took(self, seconds: float) -> None:
+        """Notes what reading it took, for those of its address that come after it."""
+        self._crowd.lap.take(seconds)
+        self._usual = max(seconds, self._usual + (seconds - self._usual) / 8)
+
+    @property
+    def _is_small(self) -> bool:
+        return self._own.share >= MUCH and self._usual <= CALM_SECONDS
 
     @property
     def is_strained(self) -> bool:
@@ -145,9 +195,9 @@ class Account:
         is_calm = self._own.share >= MUCH
         rest = seconds if is_calm else seconds * STRAINED_REST
         if self._is_crowded:
-            self._pace.pay(now, seconds)
+            self._crowd.pace.pay(now, seconds)
             is_small = is_calm and seconds <= CALM_SECONDS
-            rest = max(rest, min(self._pace.debt, seconds * CALM_REST if is_small else LONGEST_REST))
+            rest = max(rest, min(self._crowd.pace.debt, seconds * CALM_REST if is_small else LONGEST_REST))
         return rest
 
     def pay(self, now: float, seconds: float) -> bool:
@@ -165,8 +215,8 @@ class Accounts:
     def __init__(self, most_keys: int = MOST_KEYS) -> None:
         self._purses: OrderedDict[tuple[str, str, _Kind], Purse] = OrderedDict()
         self._paces: OrderedDict[str, Pace] = OrderedDict()
-        self._crowds: OrderedDict[str, Purse] = OrderedDict()
-        """Paces of the connections of an address."""
+        self._crowds: OrderedDict[str, Crowd] = OrderedDict()
+        self._laps = Laps()
         self._most = most_keys
 
     def stranger(self, address: str) -> Account:
@@ -187,7 +237,7 @@ class Accounts:
 
     def _open(self, address: str, kind: _Kind) -> Account:
         shared = tuple(self._purse(place, key, kind) for place, key in Who(address).counted())
-        return Account(shared, kind, self._known(self._crowds, Who(address).home, lambda: Purse(PACE)))
+        return Account(shared, kind, self._known(self._crowds, Who(address).home, lambda: Crowd(self._laps)))
 
     def _purse(self, place: str, key: str, kind: _Kind) -> Purse:
         times = NETWORK if place == "network" else 1.0

@@ -19,10 +19,10 @@ T = TypeVar("T")
 
 NEW_OBJECTS: Final = 5_000
 """The collector looks at the newest objects when there are so many more than before."""
-LOOKS: Final = (3, 2)
-"""After so many looks at the newest it looks at those that were left by them too, and after so many of these at all
-that is new: at 60,000 objects, which takes some 20 ms."""
-DUE, OVERDUE = 1, 120
+LOOKS: Final = (1, 1)
+"""After more looks than these at the newest it looks at those that were left by them too, and after more of these at
+all that is new: at 20,000 objects, which takes 6 to 15 ms."""
+DUE, OVERDUE = 1, 360
 """All is gone through after so many looks at what is new: when there is little to do, and however much there is."""
 CALM: Final = 0.1
 """Parts of a processor below which a process has little to do."""

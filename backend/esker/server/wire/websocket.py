@@ -17,6 +17,7 @@ from websockets.exceptions import WebSocketException
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.protocol import State
 
+from esker.fairness.laps import Waiting
 from esker.fairness.shares import Place
 from esker.fairness.spending import BYTE_SECONDS, Account
 from esker.server.wire.boundaries import FrameBoundaries
@@ -58,7 +59,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
     _deaf = False
     _rest = b""
     """Bytes that were read, and wait for the connection's next turn."""
-    _turn: asyncio.TimerHandle | None = None
+    _turn: asyncio.TimerHandle | Waiting | None = None
     place: Place | None = None
     """Place of this connection among those that the server has."""
     _holding: Holding | None = None
@@ -186,10 +187,17 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         self._parse(data)
 
     def _parse(self, data: bytes) -> None:
-        """Whole plain texts are understood here, all else by the library's parser, for one turn."""
+        """Whole plain texts are understood here, all else by the library's parser, for one turn: in this lap of the
+        event loop, or in a later one where those of its address have had their share of this."""
+        left = self._account.left()
+        if left <= 0:
+            self._rest = data
+            self.transport.pause_reading()
+            self._turn = self._account.wait(self._go_on)
+            return
         began, at, spent = time.thread_time(), 0, 0.0
         is_strained = self._account.is_strained
-        turn = STRAINED_TURN_SECONDS if is_strained else TURN_SECONDS
+        turn = min(left, STRAINED_TURN_SECONDS if is_strained else TURN_SECONDS)
         while at < len(data) and spent < turn and not self._deaf and not self.disconnected:
             taken = self._take_texts(data, at, began + turn)
             if not taken:
@@ -201,6 +209,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
                     self._refuse_handshake()
             at += taken
             spent = time.thread_time() - began
+        self._account.took(spent)
         self.pay(self._account.price(spent))
         if (at < len(data) or (is_strained and data)) and not self._deaf and not self.disconnected:
             self._rest = data[at:]

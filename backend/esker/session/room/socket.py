@@ -99,7 +99,8 @@ class Session:
         self._guest: Guest | None = None
         self._sending_since: float | None = None
         self._has_said_farewell = False
-        transport.charge(self._accounts.stranger(address), weakly(self._broke))
+        self._account = self._accounts.stranger(address)
+        transport.charge(self._account, weakly(self._broke))
 
     async def run(self, messages: AsyncIterator[str | bytes]) -> None:
         """Serves the connection until either side ends it. ``messages`` ends when the socket is gone."""
@@ -139,12 +140,14 @@ class Session:
             await self._handle(event)
         try:
             async for message in messages:
+                await self._account.turn()
                 began = time.thread_time()
                 events = self._events(message)
                 for event in events:
                     if not isinstance(event, protocol.Hi):
                         self._do(event)
                 spent = time.thread_time() - began
+                self._account.took(spent)
                 self._transport.pay(spent)
                 for event in events:
                     if isinstance(event, protocol.Hi):
@@ -184,7 +187,8 @@ class Session:
             return
         try:
             self._room, self._guest = await self._hub.enter(event.hello, self.outbox, self._address)
-            self._transport.charge(self._accounts.member(self._address), weakly(self._broke))
+            self._account = self._accounts.member(self._address)
+            self._transport.charge(self._account, weakly(self._broke))
             self._transport.listen(weakly(self._read))  # a second hello is refused, so none comes this way
         except Denied as denied:
             self.outbox.close(denied.code, denied.message, denied.ticket)

@@ -1,0 +1,132 @@
+"""Laps of an event loop: in each it does what has come by then. Forty connections that are read in one lap hold up
+whoever comes in the next, so those of an address share a part of each, and wait in line for it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from typing import Final
+
+LAP_SECONDS: Final = 0.003
+"""Processor time that the connections of one address have in one lap: others wait for its end."""
+LAP_REST: Final = 0.006
+"""After that they rest for so long, in which threads have what the loop leaves. Connections that take little each time
+only wait for the next lap: thirty people who draw behind one address are a quarter of a core."""
+CALM_LAPS: Final = 1.5
+"""A connection that takes little has a turn until those of its address have taken so many times ``LAP_SECONDS``."""
+
+
+class Laps:
+    """Numbers the laps of the event loop that runs."""
+
+    def __init__(self) -> None:
+        self._number = 0
+        self._loop: asyncio.AbstractEventLoop | None = None
+        """The loop that counts the present lap's end."""
+
+    def now(self) -> int:
+        """Returns the number of the present lap, which is greater in the next."""
+        loop = asyncio.get_running_loop()
+        if self._loop is not loop:
+            self._loop = loop
+            loop.call_soon(self._end)
+        return self._number
+
+    def _end(self) -> None:
+        self._number += 1
+        self._loop = None
+
+
+class Waiting:
+    """Somebody who waits in line."""
+
+    __slots__ = ("call",)
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        self.call: Callable[[], None] | None = call
+
+    def cancel(self) -> None:
+        """Waits no more."""
+        self.call = None
+
+
+class LapShare:
+    """What the connections of one address take of each lap. Lives in an event loop."""
+
+    __slots__ = ("_calm", "_lap", "_laps", "_others", "_taken")
+
+    def __init__(self, laps: Laps) -> None:
+        self._laps, self._lap, self._taken = laps, -1, 0.0
+        self._calm = _Line(self, LAP_SECONDS * CALM_LAPS, 0.0)
+        self._others = _Line(self, LAP_SECONDS, LAP_REST)
+
+    def left(self, is_calm: bool) -> float:
+        """Returns the seconds of this lap that they still have. ``is_calm``: for one that takes little each time."""
+        line = self._line(is_calm)
+        return 0.0 if line.is_waiting else line.left()
+
+    def take(self, seconds: float) -> None:
+        """Notes that one of them took so long just now."""
+        self._taken = self.taken() + seconds
+
+    def wait(self, is_calm: bool, call: Callable[[], None]) -> Waiting:
+        """Calls ``call`` in a later lap, after those who wait already."""
+        return self._line(is_calm).join(call)
+
+    def taken(self) -> float:
+        """Returns the seconds that they have taken in this lap."""
+        lap = self._laps.now()
+        if lap != self._lap:
+            self._lap, self._taken = lap, 0.0
+        return self._taken
+
+    def _line(self, is_calm: bool) -> _Line:
+        return self._calm if is_calm else self._others
+
+
+class _Line:
+    """Those who wait for a lap in which less than ``most`` seconds are taken, looked for every ``rest`` seconds."""
+
+    __slots__ = ("_is_serving", "_most", "_rest", "_share", "_waiting")
+
+    def __init__(self, share: LapShare, most: float, rest: float) -> None:
+        self._share, self._most, self._rest = share, most, rest
+        self._waiting: deque[Waiting] = deque()
+        self._is_serving = False
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether who comes now has to wait for others."""
+        return bool(self._waiting) and not self._is_serving
+
+    def left(self) -> float:
+        """Returns the seconds of this lap that are left."""
+        return max(0.0, self._most - self._share.taken())
+
+    def join(self, call: Callable[[], None]) -> Waiting:
+        """Waits at the end of the line."""
+        waiting = Waiting(call)
+        self._waiting.append(waiting)
+        if len(self._waiting) == 1 and not self._is_serving:
+            self._again()
+        return waiting
+
+    def _again(self) -> None:
+        loop = asyncio.get_running_loop()
+        if self._rest > 0:
+            loop.call_later(self._rest, self._serve)
+        else:
+            loop.call_soon(self._serve)
+
+    def _serve(self) -> None:
+        self._is_serving = True
+        try:
+            while self._waiting and self.left() > 0:
+                call = self._waiting.popleft().call
+                if call is not None:
+                    call()
+        finally:
+            self._is_serving = False
+            if self._waiting:
+                self._again()

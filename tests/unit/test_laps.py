@@ -1,0 +1,119 @@
+"""SPEC P661: connections of one address share each lap of the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from esker.fairness.laps import CALM_LAPS, LAP_REST, LAP_SECONDS, Laps, LapShare
+from esker.fairness.spending import Accounts
+
+
+def in_loop(run: Any) -> None:
+    asyncio.run(run())
+
+
+def test_a_lap_is_one_until_the_loop_has_come_round() -> None:
+    async def run() -> None:
+        laps = Laps()
+        first = laps.now()
+        assert laps.now() == first
+        await asyncio.sleep(0)
+        assert laps.now() == first + 1
+
+    in_loop(run)
+
+
+def test_laps_are_counted_in_another_loop_after_one_that_ended_in_the_middle() -> None:
+    laps, seen = Laps(), list[int]()
+
+    async def run() -> None:
+        for _ in range(2):
+            seen.append(laps.now())
+            await asyncio.sleep(0)
+        seen.append(laps.now())
+
+    in_loop(run)
+    in_loop(run)
+    assert seen[5] > seen[4] > seen[3], "a server that starts again in one process goes on"
+
+
+def test_who_waits_comes_in_order_so_many_a_lap() -> None:
+    async def run() -> None:
+        share, came = LapShare(Laps()), list[int]()
+
+        def come(number: int) -> None:
+            came.append(number)
+            share.take(LAP_SECONDS / 2)
+
+        share.take(LAP_SECONDS * CALM_LAPS)
+        assert share.left(is_calm=True) == 0
+        for number in range(9):
+            share.wait(is_calm=True, call=lambda number=number: come(number))  # type: ignore[misc]
+        lengths = []
+        while len(came) < 9:
+            await asyncio.sleep(0)
+            lengths.append(len(came))
+        assert came == list(range(9))
+        assert lengths == [3, 6, 9]
+
+    in_loop(run)
+
+
+def test_who_comes_waits_behind_those_who_wait() -> None:
+    async def run() -> None:
+        share = LapShare(Laps())
+        share.take(1.0)
+        waiting = share.wait(is_calm=False, call=lambda: None)
+        await asyncio.sleep(0)
+        assert share.left(is_calm=False) == 0, "though nothing of this lap is taken"
+        assert share.left(is_calm=True) > 0, "who takes little has a line of its own"
+        waiting.cancel()
+        await asyncio.sleep(2 * LAP_REST)
+        assert share.left(is_calm=False) == pytest.approx(LAP_SECONDS)
+
+    in_loop(run)
+
+
+def test_who_left_is_not_called() -> None:
+    async def run() -> None:
+        share, came = LapShare(Laps()), list[str]()
+        share.take(1.0)
+        gone = share.wait(is_calm=True, call=lambda: came.append("gone"))
+        share.wait(is_calm=True, call=lambda: came.append("here"))
+        gone.cancel()
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        assert came == ["here"]
+
+    in_loop(run)
+
+
+def test_tasks_wait_for_their_turn_and_do_not_all_begin_in_one_lap() -> None:
+    async def run() -> None:
+        accounts, begun = Accounts(), list[int]()
+        each = [accounts.member("192.0.2.1") for _ in range(8)]
+        for account in each:
+            account.took(0.002)
+
+        async def work(number: int) -> None:
+            await each[number].turn()
+            begun.append(number)
+            each[number].took(0.002)
+
+        tasks = [asyncio.create_task(work(number)) for number in range(8)]
+        await asyncio.sleep(0)
+        assert begun == [0, 1]
+        tasks[2].cancel()
+        most = 0
+        while len(begun) < 7 and most <= 2:
+            before = len(begun)
+            await asyncio.sleep(0)
+            most = max(most, len(begun) - before)
+        assert begun == [0, 1, *range(3, 8)]
+        assert most <= 2
+        await accounts.member("192.0.2.2").turn()
+
+    in_loop(run)
