@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import gc
+import sys
 from typing import Any
 
 import pytest
@@ -87,6 +89,26 @@ def test_who_left_is_not_called() -> None:
         await asyncio.sleep(0)
         await asyncio.sleep(0)
         assert came == ["here"]
+
+    in_loop(run)
+
+
+def test_shares_are_freed_the_moment_that_nobody_holds_them() -> None:
+    """SPEC S595: each connection has one until it is known whose it is."""
+
+    async def run() -> None:
+        gc.collect()
+        gc.disable()
+        try:
+            account = Accounts().member("192.0.2.1")
+            account.took(1.0)
+            account.wait(lambda: None).cancel()
+            await asyncio.sleep(2 * LAP_REST)
+            share = account._crowd.lap
+            del account
+            assert sys.getrefcount(share) == 2
+        finally:
+            gc.enable()
 
     in_loop(run)
 

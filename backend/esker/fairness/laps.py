@@ -51,15 +51,34 @@ class Waiting:
         self.call = None
 
 
+class _Taken:
+    """Seconds that were taken of the present lap."""
+
+    __slots__ = ("_lap", "_laps", "_seconds")
+
+    def __init__(self, laps: Laps) -> None:
+        self._laps, self._lap, self._seconds = laps, -1, 0.0
+
+    @property
+    def seconds(self) -> float:
+        lap = self._laps.now()
+        if lap != self._lap:
+            self._lap, self._seconds = lap, 0.0
+        return self._seconds
+
+    def take(self, seconds: float) -> None:
+        self._seconds = self.seconds + seconds
+
+
 class LapShare:
     """What the connections of one address take of each lap. Lives in an event loop."""
 
-    __slots__ = ("_calm", "_lap", "_laps", "_others", "_taken")
+    __slots__ = ("_calm", "_others", "_taken")
 
     def __init__(self, laps: Laps) -> None:
-        self._laps, self._lap, self._taken = laps, -1, 0.0
-        self._calm = _Line(self, LAP_SECONDS * CALM_LAPS, 0.0)
-        self._others = _Line(self, LAP_SECONDS, LAP_REST)
+        self._taken = _Taken(laps)
+        self._calm = _Line(self._taken, LAP_SECONDS * CALM_LAPS, 0.0)
+        self._others = _Line(self._taken, LAP_SECONDS, LAP_REST)
 
     def left(self, is_calm: bool) -> float:
         """Returns the seconds of this lap that they still have. ``is_calm``: for one that takes little each time."""
@@ -68,18 +87,11 @@ class LapShare:
 
     def take(self, seconds: float) -> None:
         """Notes that one of them took so long just now."""
-        self._taken = self.taken() + seconds
+        self._taken.take(seconds)
 
     def wait(self, is_calm: bool, call: Callable[[], None]) -> Waiting:
         """Calls ``call`` in a later lap, after those who wait already."""
         return self._line(is_calm).join(call)
-
-    def taken(self) -> float:
-        """Returns the seconds that they have taken in this lap."""
-        lap = self._laps.now()
-        if lap != self._lap:
-            self._lap, self._taken = lap, 0.0
-        return self._taken
 
     def _line(self, is_calm: bool) -> _Line:
         return self._calm if is_calm else self._others
@@ -88,10 +100,10 @@ class LapShare:
 class _Line:
     """Those who wait for a lap in which less than ``most`` seconds are taken, looked for every ``rest`` seconds."""
 
-    __slots__ = ("_is_serving", "_most", "_rest", "_share", "_waiting")
+    __slots__ = ("_is_serving", "_most", "_rest", "_taken", "_waiting")
 
-    def __init__(self, share: LapShare, most: float, rest: float) -> None:
-        self._share, self._most, self._rest = share, most, rest
+    def __init__(self, taken: _Taken, most: float, rest: float) -> None:
+        self._taken, self._most, self._rest = taken, most, rest
         self._waiting: deque[Waiting] = deque()
         self._is_serving = False
 
@@ -102,7 +114,7 @@ class _Line:
 
     def left(self) -> float:
         """Returns the seconds of this lap that are left."""
-        return max(0.0, self._most - self._share.taken())
+        return max(0.0, self._most - self._taken.seconds)
 
     def join(self, call: Callable[[], None]) -> Waiting:
         """Waits at the end of the line."""
