@@ -3,6 +3,7 @@
 import { signal } from "@preact/signals-core";
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { type AccessLink, ApiError, api } from "../../src/app/server/api.ts";
+import { classApi } from "../../src/app/server/classes/class-api.ts";
 import type { EskShare } from "../../src/ui/dialogs/share-dialog.ts";
 import "../../src/ui/dialogs/share-dialog.ts";
 import { newSecret, renewing } from "../../src/app/device/share-links.ts";
@@ -21,6 +22,7 @@ const drawing: AccessLink = { id: "l2", role: "edit", name: "Class", created: 1,
 beforeEach(() => {
   localStorage.clear();
   vi.spyOn(api, "links").mockResolvedValue([own, drawing]);
+  vi.spyOn(classApi, "list").mockResolvedValue([]);
   vi.spyOn(api, "preview").mockResolvedValue({ token: "p", shown: false, available: false });
 });
 afterEach(() => {
