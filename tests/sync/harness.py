@@ -206,6 +206,11 @@ class Peer:
             if found["settled"] and found["clock"] >= clock:
                 return
 
+    def at_rest(self, clock: int) -> None:
+        """Waits until the ground is, or has been, final for ``clock``."""
+        if not any(m["type"] == "progress" and m["settled"] and m["clock"] >= clock for m in self.seen):
+            self.settled(clock)
+
     def closed(self, timeout: float = PATIENCE) -> tuple[int, dict[str, Any] | None]:
         """Reads until the server closes: the close code, and the last error message."""
         from websockets.exceptions import ConnectionClosed

@@ -115,12 +115,6 @@ def note(peer: Peer, *words: str) -> str:
             return found
 
 
-def rest(peer: Peer, clock: int) -> None:
-    """Waits until the ground is, or has been, final for ``clock``."""
-    if not any(m["type"] == "progress" and m["settled"] and m["clock"] >= clock for m in peer.seen):
-        peer.settled(clock)
-
-
 def draw(peer: Peer, first: int, count: int = 5) -> None:
     """Ops one after the other, each acknowledged although the device is failing."""
     for n in range(first, first + count):
@@ -136,25 +130,25 @@ def finest(frames: list[bytes]) -> int:
 @pytest.mark.parametrize("error", [DeviceLostError, BuildError, DeviceError])
 def test_the_next_device_takes_over_from_one_that_fails(clinic: Build, error: type[DeviceError]) -> None:
     ward, peer = clinic()
-    rest(peer, 0)
+    peer.at_rest(0)
     ward.faults["gpu"] = lambda level: error("gpu broke while solving.") if level == 1 else None
     draw(peer, 1)
     said = note(peer, "gpu broke", "cpu")
     assert said == "gpu broke while solving. The solver now runs on cpu and goes on."
     draw(peer, 6)
-    rest(peer, 10)
+    peer.at_rest(10)
     assert ward.made == ["gpu", "cpu"]
     peer.close()
 
 
 def test_numpy_takes_over_when_no_other_device_can_be_made(clinic: Build) -> None:
     ward, peer = clinic()
-    rest(peer, 0)
+    peer.at_rest(0)
     ward.unmakeable.add("cpu")
     ward.faults["gpu"] = lambda _: DeviceLostError("gpu was lost.")
     draw(peer, 1)
     note(peer, "gpu was lost", NUMPY)
-    rest(peer, 5)
+    peer.at_rest(5)
     assert ward.made == ["gpu", "numpy"]
     peer.close()
 
@@ -189,18 +183,18 @@ def test_a_job_that_cannot_be_computed_takes_the_device_from_nobody(
     monkeypatch.setattr(Poison, "error", error)
     ward, peer = clinic()
     other = ward.server.join(*ward.server.create(), client="c2")
-    rest(peer, 0)
-    rest(other, 0)
+    peer.at_rest(0)
+    other.at_rest(0)
     peer.ops(("c1:1", stroke()), ("c1:2", set_op(first=[100, 100, 600.0])))
     assert note(peer, "tried again") == AGAIN
     assert note(peer, "waits") == GIVEN_UP
     for n in range(1, 4):
         other.ops((f"c2:{n}", stroke() if n == 1 else set_op(first=[100, 100, float(n)])))
-        rest(other, n)
+        other.at_rest(n)
     assert ward.made == ["gpu"], "nobody was moved"
     assert not any("runs on" in m["note"] for m in other.seen if m["type"] == "progress")
     peer.ops(("c1:3", set_op(first=[100, 100, 5.0])))
-    rest(peer, 3)
+    peer.at_rest(3)
     peer.close()
     other.close()
 
@@ -208,11 +202,11 @@ def test_a_job_that_cannot_be_computed_takes_the_device_from_nobody(
 def test_a_device_that_one_job_broke_is_opened_again(clinic: Build) -> None:
     """SPEC P221: a context that is lost is not a device that is lost."""
     ward, peer = clinic()
-    rest(peer, 0)
+    peer.at_rest(0)
     broken = [DeviceLostError("gpu was lost.")] * 2
     ward.faults["gpu"] = lambda _: broken.pop() if broken else None
     draw(peer, 1)
-    rest(peer, 5)
+    peer.at_rest(5)
     assert ward.made == ["gpu", "gpu"]
     assert not any("runs on" in m["note"] for m in peer.seen if m["type"] == "progress")
     peer.close()
@@ -220,18 +214,18 @@ def test_a_device_that_one_job_broke_is_opened_again(clinic: Build) -> None:
 
 def test_errors_nobody_knows_are_proved_before_the_device_is_left(clinic: Build) -> None:
     ward, peer = clinic()
-    rest(peer, 0)
+    peer.at_rest(0)
     ward.faults["gpu"] = lambda _: RuntimeError("what is this?")
     peer.ops(("c1:1", stroke()))
     note(peer, "what is this?", "cpu")
-    rest(peer, 1)
+    peer.at_rest(1)
     peer.close()
 
 
 def test_equations_that_diverge_are_no_fault_of_the_device(clinic: Build) -> None:
     """SPEC P80: however often it happens."""
     ward, peer = clinic()
-    rest(peer, 0)
+    peer.at_rest(0)
     ward.faults["gpu"] = lambda _: DivergedError()
     for n in range(1, 6):
         draw(peer, n, 1)
@@ -239,7 +233,7 @@ def test_equations_that_diverge_are_no_fault_of_the_device(clinic: Build) -> Non
         peer.seen.clear()
     ward.faults.clear()
     draw(peer, 6)
-    rest(peer, 10)
+    peer.at_rest(10)
     assert ward.made == ["gpu"]
     peer.close()
 
@@ -250,38 +244,38 @@ def test_without_a_device_that_works_the_room_says_so(clinic: Build, names: tupl
     assert peer.welcome["device"] == NUMPY
     assert note(peer, "NumPy").startswith(f"The solver runs on {NUMPY}")
     draw(peer, 1)
-    rest(peer, 5)
+    peer.at_rest(5)
     peer.close()
 
 
 def test_the_better_device_is_used_again_when_it_works_again(clinic: Build) -> None:
     ward, peer = clinic(retry=0.3)
-    rest(peer, 0)
+    peer.at_rest(0)
     ward.faults["gpu"] = lambda _: DeviceLostError("gpu was lost.")
     ward.unmakeable.add("gpu")
     draw(peer, 1)
     note(peer, "gpu was lost", "cpu")
-    rest(peer, 5)
+    peer.at_rest(5)
     ward.faults.clear()
     ward.unmakeable.clear()
     assert note(peer, "again") == "The solver runs on gpu again."
     draw(peer, 6)
-    rest(peer, 10)
+    peer.at_rest(10)
     assert ward.made == ["gpu", "cpu", "gpu"]
     peer.close()
 
 
 def test_what_does_not_fit_is_solved_coarser_and_finer_again_later(clinic: Build) -> None:
     ward, peer = clinic(retry=0.5)
-    rest(peer, 0)
+    peer.at_rest(0)
     ward.faults["gpu"] = lambda level: OutOfDeviceMemoryError("too big") if level > 1 else None
     draw(peer, 1)
     said = note(peer, "too little memory")
     assert said == "gpu has too little memory for level 2: the ground is shown up to level 1 for now."
-    rest(peer, 5)
+    peer.at_rest(5)
     before = len(peer.frames)
     peer.ops(("c1:6", set_op(first=[100, 100, 77.0])))
-    rest(peer, 6)
+    peer.at_rest(6)
     peer.say("ping", t=1)
     peer.wait("pong")
     assert finest(peer.frames[before:]) <= 1
@@ -298,11 +292,11 @@ def test_what_does_not_fit_is_solved_coarser_and_finer_again_later(clinic: Build
 
 def test_a_device_without_memory_for_anything_is_left(clinic: Build) -> None:
     ward, peer = clinic()
-    rest(peer, 0)
+    peer.at_rest(0)
     ward.faults["gpu"] = lambda _: OutOfDeviceMemoryError("gpu is full.")
     draw(peer, 1)
     note(peer, "gpu is full", "cpu")
-    rest(peer, 5)
+    peer.at_rest(5)
     peer.close()
 
 

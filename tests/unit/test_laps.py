@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import gc
 import sys
+from functools import partial
 from typing import Any
 
 import pytest
 
-from esker.fairness.laps import CALM_LAPS, LAP_REST, LAP_SECONDS, Laps, LapShare
+from esker.fairness.laps import LAP_REST, LAP_SECONDS, SMALL_LAPS, Laps, LapShare
 from esker.fairness.spending import Accounts
 
 
@@ -50,10 +51,10 @@ def test_who_waits_comes_in_order_so_many_a_lap() -> None:
             came.append(number)
             share.take(LAP_SECONDS / 2)
 
-        share.take(LAP_SECONDS * CALM_LAPS)
-        assert share.left(is_calm=True) == 0
+        share.take(LAP_SECONDS * SMALL_LAPS)
+        assert share.left(is_small=True) == 0
         for number in range(9):
-            share.wait(is_calm=True, call=lambda number=number: come(number))  # type: ignore[misc]
+            share.wait(is_small=True, call=partial(come, number))
         lengths = []
         while len(came) < 9:
             await asyncio.sleep(0)
@@ -68,13 +69,13 @@ def test_who_comes_waits_behind_those_who_wait() -> None:
     async def run() -> None:
         share = LapShare(Laps())
         share.take(1.0)
-        waiting = share.wait(is_calm=False, call=lambda: None)
+        waiting = share.wait(is_small=False, call=lambda: None)
         await asyncio.sleep(0)
-        assert share.left(is_calm=False) == 0, "though nothing of this lap is taken"
-        assert share.left(is_calm=True) > 0, "who takes little has a line of its own"
+        assert share.left(is_small=False) == 0, "though nothing of this lap is taken"
+        assert share.left(is_small=True) > 0, "who takes little has a line of its own"
         waiting.cancel()
         await asyncio.sleep(2 * LAP_REST)
-        assert share.left(is_calm=False) == pytest.approx(LAP_SECONDS)
+        assert share.left(is_small=False) == pytest.approx(LAP_SECONDS)
 
     in_loop(run)
 
@@ -83,8 +84,8 @@ def test_who_left_is_not_called() -> None:
     async def run() -> None:
         share, came = LapShare(Laps()), list[str]()
         share.take(1.0)
-        gone = share.wait(is_calm=True, call=lambda: came.append("gone"))
-        share.wait(is_calm=True, call=lambda: came.append("here"))
+        gone = share.wait(is_small=True, call=lambda: came.append("gone"))
+        share.wait(is_small=True, call=lambda: came.append("here"))
         gone.cancel()
         await asyncio.sleep(0)
         await asyncio.sleep(0)
@@ -136,6 +137,32 @@ def test_tasks_wait_for_their_turn_and_do_not_all_begin_in_one_lap() -> None:
             most = max(most, len(begun) - before)
         assert begun == [0, 1, *range(3, 8)]
         assert most <= 2
-        await accounts.member("192.0.2.2").turn()
+
+    in_loop(run)
+
+
+def test_pages_that_have_just_come_do_not_all_begin_in_one_lap_either() -> None:
+    """What they take is not known yet."""
+
+    async def run() -> None:
+        accounts, begun = Accounts(), list[int]()
+
+        async def work(number: int) -> None:
+            await accounts.member("192.0.2.1").turn()
+            begun.append(number)
+
+        tasks = [asyncio.create_task(work(number)) for number in range(20)]
+        asyncio.get_running_loop().call_soon(accounts.member("192.0.2.1").took, 1.0)
+        late = [asyncio.create_task(work(number)) for number in range(20, 40)]
+        other = asyncio.create_task(accounts.member("192.0.2.2").turn())
+        await asyncio.sleep(0)
+        assert begun == list(range(20)), "before anybody took much"
+        await asyncio.sleep(0)
+        assert other.done(), "another address does not wait for them"
+        while len(begun) < 40:
+            before = len(begun)
+            await asyncio.sleep(0)
+            assert len(begun) - before <= 5
+        await asyncio.gather(*tasks, *late)
 
     in_loop(run)

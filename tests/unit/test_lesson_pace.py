@@ -228,6 +228,19 @@ def test_a_full_room_is_told_of_its_members_at_a_pace(hide: bool) -> None:
     assert not members.pending
 
 
+def conducted(room: Room, read: Any) -> Any:
+    """The lesson of a room, in the running loop; ``read`` is how what people did is read."""
+
+    async def flush() -> None:
+        pass
+
+    made: Any = Conducting
+    return made(
+        room.core, room.journal, asyncio.get_running_loop(), Desk(read, lambda _: None),
+        ordered=lambda: None, flush=flush, people_changed=lambda: None,
+    )  # fmt: skip
+
+
 def test_who_asked_is_told_where_not_all_could_be_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC L165: nobody is told that everything was taken back where an op was refused on the way."""
     room = Room()
@@ -237,14 +250,7 @@ def test_who_asked_is_told_where_not_all_could_be_taken_back(monkeypatch: pytest
         return SimpleNamespace(plan=lambda _: UndoPlan((c.DeleteStroke(stroke="gone"),), ()))
 
     async def run() -> None:
-        async def flush() -> None:
-            pass
-
-        made: Any = Conducting
-        conducting = made(
-            room.core, room.journal, asyncio.get_running_loop(), Desk(read, lambda _: None),
-            ordered=lambda: None, flush=flush, people_changed=lambda: None,
-        )  # fmt: skip
+        conducting = conducted(room, read)
         conducting.receive(room.owner, c.People(action="undo", people=("somebody",)))
         await asyncio.sleep(0.05)
         conducting.close()
@@ -269,14 +275,7 @@ def test_what_is_read_to_take_back_counts_for_who_asks() -> None:
             asked.append(who)
             return Deeds(())
 
-        async def flush() -> None:
-            pass
-
-        made: Any = Conducting
-        conducting = made(
-            room.core, room.journal, asyncio.get_running_loop(), Desk(read, lambda _: None),
-            ordered=lambda: None, flush=flush, people_changed=lambda: None,
-        )  # fmt: skip
+        conducting = conducted(room, read)
         conducting.receive(room.owner, c.People(action="undo", people=("somebody",)))
         while not asked:
             await asyncio.sleep(0)

@@ -13,8 +13,8 @@ LAP_SECONDS: Final = 0.003
 LAP_REST: Final = 0.006
 """After that they rest for so long, in which threads have what the loop leaves. Connections that take little each time
 only wait for the next lap: thirty people who draw behind one address are a quarter of a core."""
-CALM_LAPS: Final = 1.5
-"""A connection that takes little has a turn until those of its address have taken so many times ``LAP_SECONDS``."""
+SMALL_LAPS: Final = 1.5
+"""One that takes little each time has a turn until those of its address have taken so many times ``LAP_SECONDS``."""
 
 
 class Laps:
@@ -73,28 +73,28 @@ class _Taken:
 class LapShare:
     """What the connections of one address take of each lap. Lives in an event loop."""
 
-    __slots__ = ("_calm", "_others", "_taken")
+    __slots__ = ("_others", "_small", "_taken")
 
     def __init__(self, laps: Laps) -> None:
         self._taken = _Taken(laps)
-        self._calm = _Line(self._taken, LAP_SECONDS * CALM_LAPS, 0.0)
+        self._small = _Line(self._taken, LAP_SECONDS * SMALL_LAPS, 0.0)
         self._others = _Line(self._taken, LAP_SECONDS, LAP_REST)
 
-    def left(self, is_calm: bool) -> float:
-        """Returns the seconds of this lap that they still have. ``is_calm``: for one that takes little each time."""
-        line = self._line(is_calm)
+    def left(self, is_small: bool) -> float:
+        """Returns the seconds of this lap that they still have. ``is_small``: for one that takes little each time."""
+        line = self._line(is_small)
         return 0.0 if line.is_waiting else line.left()
 
     def take(self, seconds: float) -> None:
         """Notes that one of them took so long just now."""
         self._taken.take(seconds)
 
-    def wait(self, is_calm: bool, call: Callable[[], None]) -> Waiting:
+    def wait(self, is_small: bool, call: Callable[[], None]) -> Waiting:
         """Calls ``call`` in a later lap, after those who wait already."""
-        return self._line(is_calm).join(call)
+        return self._line(is_small).join(call)
 
-    def _line(self, is_calm: bool) -> _Line:
-        return self._calm if is_calm else self._others
+    def _line(self, is_small: bool) -> _Line:
+        return self._small if is_small else self._others
 
 
 class _Line:

@@ -50,7 +50,7 @@ CALM_REST, CALM_SECONDS = 20.0, 0.001
 ``CALM_REST`` times that, beside those of its address that have taken much: what somebody draws comes a moment later,
 and not when the others have paid."""
 USUAL_SECONDS: Final = 0.001
-"""What a request costs, before anything is known of those of its address."""
+"""What a request costs before anything is known of those of its address, and what reading a connection does."""
 NETWORK: Final = 3.0
 """An IPv6 /48 has so many times the processor time of an address."""
 BYTE_SECONDS: Final = 1e-8
@@ -138,8 +138,8 @@ class Account:
     def __init__(self, shared: tuple[Purse, ...] = (), kind: _Kind = _STRANGER, crowd: Crowd | None = None) -> None:
         """``crowd``: the connections of its address (default: it is the only one)."""
         self._own, self._shared, self._crowd = Purse(kind.own), shared, crowd or Crowd(Laps())
-        self._usual = 0.0
-        """What reading it takes of late, seconds."""
+        self._usual = USUAL_SECONDS
+        """What reading it takes of late."""
 
     def left(self) -> float:
         """Returns the seconds for which it may be read in this lap of the event loop, 0 where it has to wait in line.
@@ -156,10 +156,9 @@ class Account:
             return
         begun = asyncio.get_running_loop().create_future()
 
-        def begin() -> None:  # a lap later: as much is kept for it
+        def begin() -> None:  # it goes on a lap later: as much of this one is kept free
             self._crowd.lap.take(self._usual)
-            if not begun.done():
-                begun.set_result(None)
+            begun.set_result(None)
 
         waiting = self.wait(begin)
         try:
