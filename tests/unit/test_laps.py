@@ -166,3 +166,20 @@ def test_pages_that_have_just_come_do_not_all_begin_in_one_lap_either() -> None:
         await asyncio.gather(*tasks, *late)
 
     in_loop(run)
+
+
+def test_who_is_cancelled_in_the_lap_before_its_turn_is_passed_over() -> None:
+    async def run() -> None:
+        accounts, wrong = Accounts(), list[Any]()
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(lambda _, context: wrong.append(context))
+        loop.call_soon(accounts.member("192.0.2.1").took, 1.0)
+        waiting = asyncio.create_task(accounts.member("192.0.2.1").turn())
+        await asyncio.sleep(0)
+        waiting.cancel()  # it hears of that in the next lap, after it was served
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        assert waiting.cancelled()
+        assert wrong == []
+
+    in_loop(run)

@@ -157,8 +157,9 @@ class Account:
         begun = asyncio.get_running_loop().create_future()
 
         def begin() -> None:  # it goes on a lap later: as much of this one is kept free
-            self._crowd.lap.take(self._usual)
-            begun.set_result(None)
+            if not begun.done():  # whoever waited was cancelled in this lap, and hears of that in the next
+                self._crowd.lap.take(self._usual)
+                begun.set_result(None)
 
         waiting = self.wait(begin)
         try:
