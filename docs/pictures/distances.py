@@ -36,8 +36,8 @@ class Place(NamedTuple):
 
 
 PLACES: Final = {
-    "natural": Place("alpine-ridge", (1583, 1461), 236, (160, 26)),
-    "alpine": Place("alpine-ridge", (1430, 1760), 190, (160, 20)),
+    "natural": Place("alpine-ridge", (2000, 1370), 200, (160, 26)),
+    "alpine": Place("alpine-ridge", (1600, 1950), 190, (160, 20)),
     "desert": Place("canyon", (1500, 1900), 200, None),
     "paper": Place("figure-six", (1500, 1640), 200, None),
 }

@@ -24,7 +24,7 @@ SHOTS: dict[str, list[str]] = {
     "lake": ["volcanic-island", "--sun", "128,22", "--camera", "eye:2330,1660,900,target:2050,2130,500"],
     "close-up": [
         *("alpine-ridge", "--sun", "222,12", "--refine", "10"),
-        *("--camera", "eye:1560,1420,target:1985,2600,372"),
+        *("--camera", "eye:1650,1340,target:2100,2600,420"),
     ],
     "real-crater": ["helens", "--camera", "orbit:20,22,2600,target:1450,1200,2000"],
     "real-rainier": ["rainier", "--camera", "orbit:318,9,46000,target:52000,14000,2000"],

@@ -43,12 +43,12 @@ def figure_six() -> dict[str, object]:
 
 def alpine_ridge() -> dict[str, object]:
     """A main divide with horns and spurs on both sides, above a trough valley with a river."""
-    pen = Pen("alpine-ridge", 41)
+    pen = Pen("alpine-ridge", 45)
     divide = [
         (-420, 2560, 380), (180, 2700, 720), (760, 2620, 640), (1330, 2840, 1060), (1820, 2700, 850),
         (2330, 2930, 1290), (2800, 2760, 900), (3280, 2900, 1080), (3800, 2700, 700), (4500, 2800, 360),
     ]  # fmt: skip
-    pen.massif(divide, 40, spacing=560, reach=1.28, spurs=1, meander=0.14, label="Main divide")
+    pen.massif(divide, 40, spacing=560, reach=0.9, spurs=1, foot=0.3, meander=0.14, label="Main divide")
     south = [
         (-300, 260, 300),
         (480, 120, 520),
@@ -58,12 +58,10 @@ def alpine_ridge() -> dict[str, object]:
         (3500, 40, 590),
         (4400, 200, 260),
     ]
-    pen.massif(south, 36, spacing=620, reach=1.3, spurs=1, meander=0.14, label="South chain")
-    river = [
-        (-100, 1230, 34), (620, 1130, 26), (1240, 1260, 18), (1900, 1110, 10),
-        (2560, 1240, 2), (3240, 1100, -6), (4200, 1210, -16),
-    ]  # fmt: skip
-    pen.chain(river, (6, 200), (6, 200), wobble=0.0, label="River")
+    pen.massif(south, 36, spacing=620, reach=0.7, spurs=1, foot=0.3, meander=0.14, label="South chain")
+    bends = [(-100, 1230), (620, 1130), (1240, 1260), (1900, 1110), (2560, 1240), (3240, 1100), (4200, 1210)]
+    river = [(float(x), float(y), -27.0 - 0.0115 * float(x)) for x, y in smooth_path(bends, closed=False, each=3)]
+    pen.chain(river, (10, 500), (10, 500), wobble=0.0, label="River")
     settings = TerrainSettings(title="Alpine ridge", sun_azimuth_deg=128.0, sun_elevation_deg=22.0, reach_m=300.0)
     words = "A divide with horns and spurs above a broad valley with its river."
     return template(pen, "Alpine ridge", words, settings)

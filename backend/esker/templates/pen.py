@@ -55,19 +55,24 @@ class Pen:
         spacing: float = 420.0,
         reach: float = 1.35,
         spurs: int = 2,
+        foot: float = 0.0,
         label: str = "",
         meander: float = 0.1,
     ) -> None:
         """A ridge with spurs that branch off on both sides, again with spurs of their own (``spurs`` generations).
 
         A spur falls more gently than the flank it stands on, so that it stays above it: ``reach`` is its length over
-        the width of that flank.
+        the width of that flank. ``foot`` is the height at which a spur ends, as a share of that at which it begins. A
+        spur that runs into a sea ends at 0. One that ends in a valley must end above the valley's ground: a tip below
+        that ground is a pit, in which water stands.
         """
         path = self._bent(crest, meander)
         self.chain(path, (slope, 4000), (slope, 4000), wobble=0.025, label=label)
-        self._branch(path, slope, spacing, reach, spurs, label)
+        self._branch(path, slope, spacing, reach, spurs, foot, label)
 
-    def _branch(self, path: Sequence[Point], slope: float, spacing: float, reach: float, left: int, label: str) -> None:
+    def _branch(
+        self, path: Sequence[Point], slope: float, spacing: float, reach: float, left: int, foot: float, label: str
+    ) -> None:
         pts = np.asarray(path)
         run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pts[:, :2], axis=0).T))])
         side = float(self.rng.choice([-1.0, 1.0]))
@@ -79,14 +84,14 @@ class Pen:
             length = reach * z / math.tan(math.radians(slope)) * float(self.rng.uniform(0.85, 1.15))
             if length > 0.5 * spacing:
                 angle = math.atan2(ty, tx) + side * math.radians(float(self.rng.uniform(58, 84)))
-                spur = self.spur((x, y, z * 0.985), angle, length)
+                spur = self.spur((x, y, z * 0.985), angle, length, foot)
                 self.chain(spur, (slope, 4000), (slope, 4000), wobble=0.03, label=f"{label} spur")
-                self._branch(spur, slope, spacing * 0.72, reach * 0.9, left - 1, label)
+                self._branch(spur, slope, spacing * 0.72, reach * 0.9, left - 1, foot, label)
             side = -side
             at += 0.5 * spacing * float(self.rng.uniform(0.75, 1.3))
 
-    def spur(self, root: Point, angle: float, length: float, legs: int = 0) -> list[Point]:
-        """A spur in a few legs that wander off the straight line, from the root down to the base."""
+    def spur(self, root: Point, angle: float, length: float, foot: float = 0.0, legs: int = 0) -> list[Point]:
+        """A spur in a few legs that wander off the straight line, from the root down to ``foot`` times its height."""
         legs = legs or max(3, round(length / 260))
         out = [root]
         x, y, _ = root
@@ -94,7 +99,8 @@ class Pen:
             angle += math.radians(float(self.rng.normal(0, 11)))
             x, y = x + length / legs * math.cos(angle), y + length / legs * math.sin(angle)
             t = i / legs
-            out.append((x, y, root[2] * (1 - t) ** 1.12 * (1 if i == legs else float(self.rng.uniform(0.93, 1.07)))))
+            above = root[2] * (1 - t) ** 1.12 * (1 if i == legs else float(self.rng.uniform(0.93, 1.07)))
+            out.append((x, y, foot * root[2] + (1 - foot) * above))
         return out
 
     def _bent(self, points: Sequence[Point], meander: float) -> list[Point]:
