@@ -183,7 +183,7 @@ export interface FootprintVisual {
   readonly colour: Rgba;
   /** Selected, or being placed. */
   readonly strong: boolean;
-  /** Half the width of a river on the screen; a river has no rim, and hills hide it. */
+  /** Half the width of a river on the 2D map, where alone rivers are lines; a river has no rim. */
   readonly halfWidthPx?: number;
 }
 

@@ -231,8 +231,7 @@ export class Stage {
       const settings = session.doc.doc.value?.settings;
       const set = session.rivers.value;
       if (!settings?.rivers || set === null || this.graphics.info.value?.kind !== "map") return [];
-      const ground = this.#still.ground.value;
-      return ground === null ? [] : riverLines(set, settings.wetness, ground);
+      return riverLines(set, settings.wetness, sizeM);
     });
     this.#shownRivers = new ShownRivers(sizeM);
     this.#cursors = computed(() => cursorVisuals(session.people.value));

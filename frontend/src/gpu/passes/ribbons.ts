@@ -83,9 +83,8 @@ export function strokeStyle(stroke: StrokeVisual, scale: number): RibbonStyle {
   };
 }
 
-/** Outlines of grids, thin, under all strokes; and rivers. */
-export function footprintStyle({ colour, strong, halfWidthPx }: FootprintVisual, scale: number): RibbonStyle {
-  if (halfWidthPx !== undefined) return { colour, halfWidthPx: halfWidthPx * scale, haloPx: 0, hiddenOpacity: 0 };
+/** Outlines of grids, thin, under all strokes. (Rivers are lines on the 2D map alone: here the ground's shader draws them.) */
+export function footprintStyle({ colour, strong }: FootprintVisual, scale: number): RibbonStyle {
   return {
     colour,
     halfWidthPx: (strong ? 1.5 : 0.9) * scale,
