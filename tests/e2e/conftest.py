@@ -42,7 +42,7 @@ are not seen unless they ask for that: in their screenshots the 3D view is missi
 PATIENCE_MS = 90_000
 """How long hands and eyes wait: limits end what hangs, a busy machine takes its time."""
 
-HERTZ = 4
+HERTZ = 2
 """Pictures a second that a window shows at most, as a slow screen would: else pages of the software adapter draw all
 that the processors can, for frames that nobody looks at, while the server that they wait for gets what is left."""
 SLOW_SCREEN = """

@@ -6,13 +6,11 @@ import io
 import json
 import time
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
 from PIL import Image
 
-from tests.e2e.conftest import Server, Visitor, Visitors, serving
+from tests.e2e.conftest import Server, Visitor, Visitors
 from tests.e2e.hands import arch, draw, on_screen, wait, wait_settled
 
 CARD = """number => {
@@ -25,12 +23,6 @@ CARD = """number => {
   return colours.size;
 }"""
 """How many colours a card of the wall has: flat ground has one."""
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    """A server of its own."""
-    yield from serving(tmp_path)
 
 
 def _press(page: Visitor, selector: str, words: str) -> None:

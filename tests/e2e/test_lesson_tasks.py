@@ -6,20 +6,11 @@ import csv
 import io
 import json
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
-from tests.e2e.conftest import Server, Visitor, Visitors, serving
+from tests.e2e.conftest import Server, Visitor, Visitors
 from tests.e2e.hands import Pixel, arch, draw, on_screen, wait, wait_apart, wait_settled, wait_still
 from tests.e2e.test_everyone import Fingers
-
-
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    """A server of its own."""
-    yield from serving(tmp_path)
 
 
 def press(visitor: Visitor, words: str, within: str = "body") -> None:

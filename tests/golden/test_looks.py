@@ -46,7 +46,7 @@ SHOTS: dict[str, dict[str, Any]] = {
         "settings": {"lakes_m": 4},
     },
     "strokes": {**VIEW, "world": "smooth", "eye": [2048, -600, 900], "target": [2048, 2000, 150], "strokes": True},
-    "rich": {**VIEW, "rich": True, "width": 320, "height": 200, "eye": [3300, -200, 700], "target": [2000, 2400, 250]},
+    "rich": {**VIEW, "rich": True, "width": 192, "height": 120, "eye": [3300, -200, 700], "target": [2000, 2400, 250]},
     "map": {**VIEW, "eye": [0, 0, 0], "target": [2048, 2048, 0], "map": 4600, "print": True, "strokes": True},
 }
 
