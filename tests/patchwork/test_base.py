@@ -231,11 +231,12 @@ def changes() -> list:  # type: ignore[type-arg]
 def test_a_change_is_told_where_it_is() -> None:
     """SPEC PW56: nothing differs outside of the rectangle, on any level; and it is no larger than it must be."""
     before = Base(MODEL, SIZE)
-    for change in changes():
+    for number, change in enumerate(changes()):
         after = Base(change(before.model), SIZE, before)
         rect = after.changed(before)
         assert rect is not None
-        for level in (0, 3, 5):
+        # Level 5 is finer than all data and costs as much as seven changes on the others, so only the first meets it.
+        for level in (0, 3, 4) if number else (0, 3, 5):
             s = grid.spacing(level, SIZE)
             differ = np.argwhere(after.level(level) != before.level(level)) * s
             if len(differ):

@@ -11,13 +11,16 @@ from hypothesis import HealthCheck, Phase, given, settings
 
 from bench.solver import _adversary, _direct, search
 
-CASES = (("opencl", 0, 130), ("opencl", 1, 30), ("opencl", 2, 4), ("numpy", 0, 30), ("numpy", 1, 6))
+CASES = ((0, 130), (1, 30), (2, 4))
+"""Levels, and scenes of each."""
+NUMPY_EVERY = 4
+"""One scene of so many is solved by NumPy, too, but on level 2: it takes ten times as long as OpenCL."""
 
 
-@pytest.mark.parametrize(("device", "level", "cases"), CASES)
-def test_settled_ground_is_that_of_direct_solves(device: str, level: int, cases: int) -> None:
-    if device not in search.solvers():
-        pytest.skip("there is no OpenCL here")
+@pytest.mark.parametrize(("level", "cases"), CASES)
+def test_settled_ground_is_that_of_direct_solves(level: int, cases: int) -> None:
+    """The direct solve of a scene serves all solvers that are compared with it."""
+    seen = 0
 
     @settings(
         max_examples=cases,
@@ -29,7 +32,12 @@ def test_settled_ground_is_that_of_direct_solves(device: str, level: int, cases:
     )
     @given(_adversary.scenes(level))
     def every(scene: _direct.Scene) -> None:
-        found = _direct.measure(scene, {device: search.solvers()[device]})
+        nonlocal seen
+        solvers = dict(search.solvers())
+        if "opencl" in solvers and (level == 2 or seen % NUMPY_EVERY):
+            del solvers["numpy"]
+        seen += 1
+        found = _direct.measure(scene, solvers)
         assert max(found.values()) <= 1, (found, scene.document())
 
     with _adversary.drawn_alike():

@@ -10,6 +10,7 @@ from esker.solve.opencl.device import Device, open_device, row_kernels
 from esker.solve.solver import Solver
 from tests.solver.failing import STROKES
 from tests.solver.scenes import SETTINGS
+from tests.solver.twins import small_tiles
 
 
 @pytest.fixture(scope="session")
@@ -27,13 +28,19 @@ def solver() -> Solver:
 
 
 @pytest.fixture(params=["rows", "tiles"])
-def used(request: pytest.FixtureRequest) -> Solver:
-    """A solver that has solved, with an idle workspace of level 2, on a device of a name of its own."""
+def fresh(request: pytest.FixtureRequest) -> Solver:
+    """A solver that has not solved, on a device of a name of its own."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ESKER_KERNELS", request.param)
-        made = Solver()
+        made = small_tiles(Solver())
     if made._device is None:
         pytest.skip("no OpenCL device")
     made._device = replace(made._device, name=f"{request.param} under test")
-    made.solve(STROKES, SETTINGS, 2)
     return made
+
+
+@pytest.fixture
+def used(fresh: Solver) -> Solver:
+    """The same with an idle workspace of level 2, as it has solved."""
+    fresh.solve(STROKES, SETTINGS, 2)
+    return fresh

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import cache
+
 import numpy as np
 import pytest
 
 from esker import grid
-from esker.contract import TerrainSettings
 from esker.solve import reference
 from esker.solve.constraints import raster_reference
 from esker.solve.constraints.constraints import pack
+from esker.solve.constraints.raster_reference import Constraints
 from esker.solve.constraints.tables import LINE_STIFFNESS
 from esker.solve.constraints.tables import PINNED as PINNED_SAMPLE
 from esker.solve.opencl.device import Device
@@ -25,6 +28,7 @@ from tests.solver.twins import (
     new_system,
     new_workspace,
     noise,
+    noise_fields,
     stiffness,
     tile_device,
 )
@@ -39,18 +43,47 @@ def kernels(request: pytest.FixtureRequest, device: Device) -> Device:
     return found
 
 
+@pytest.fixture(scope="module", params=["rows", "tiles"])
+def rasteriser(request: pytest.FixtureRequest, device: Device) -> Device:
+    """A device with one kind of kernels. What rasterises is the same for tiles of all sizes (``gpu_program``)."""
+    found = device if request.param == "rows" else tile_device("full")
+    assert found is not None
+    return found
+
+
+@cache
+def twin_visit(level: int, channels: int, start: str) -> tuple[Field, Field]:
+    """What the twin makes of the fields of noise, once for all kinds of kernels."""
+    host = noise_fields(level, channels)
+    return reference.visit(
+        None if start == "zero" else host["u"], None if start == "guess" else host["e"], host["f"], host["d"], EPS
+    )
+
+
+@cache
+def twin_raster(scene: str, pinned: bool, level: int) -> Constraints:
+    """What the twin makes of a scene, once for all kinds of kernels."""
+    return raster_reference.rasterise(pack(SCENES[scene], PINNED if pinned else SETTINGS, level))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _twins_go() -> Iterator[None]:
+    """The twins' results, some hundred megabytes, go with the last test."""
+    yield
+    twin_visit.cache_clear()
+    twin_raster.cache_clear()
+
+
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("channels", [1, 2])
 @pytest.mark.parametrize("start", ["zero", "guess", "both"])
 def test_visit(kernels: Device, level: int, channels: int, start: str) -> None:
     s = new_system(kernels, level, channels)
-    host = fill(s)
+    fill(s)
     guess = None if start == "zero" else "u"
     correction = None if start == "guess" else "e"
     s.visit(level, rhs="f", out="v", guess=guess, correction=correction, residual=True)
-    u, coarse = reference.visit(
-        host["u"] if guess else None, host["e"] if correction else None, host["f"], host["d"], EPS
-    )
+    u, coarse = twin_visit(level, channels, start)
     close(s.get("v", level), u)
     close(s.get("b", level - 1), coarse)
 
@@ -183,14 +216,14 @@ def test_fixed_samples_are_held(kernels: Device) -> None:
 
 
 @pytest.mark.parametrize("scene", ["one", "cross", "loops", "fifty"])
-@pytest.mark.parametrize("settings", [SETTINGS, PINNED], ids=["free", "pinned"])
-def test_rasterise(kernels: Device, scene: str, settings: TerrainSettings) -> None:
+@pytest.mark.parametrize("pinned", [False, True], ids=["free", "pinned"])
+def test_rasterise(rasteriser: Device, scene: str, pinned: bool) -> None:
     """Float32 may pick the neighbouring segment within a few hundredths of a cell of a vertex, and see the slope of
     that one; the heights hardly differ. So: tight for nearly all samples, loose for the rest."""
     level = 3
-    w = new_workspace(kernels, level)
-    w.load(SCENES[scene], settings)
-    c = raster_reference.rasterise(pack(SCENES[scene], settings, level))
+    w = new_workspace(rasteriser, level)
+    w.load(SCENES[scene], PINNED if pinned else SETTINGS)
+    c = twin_raster(scene, pinned, level)
     pairs = (
         (w.height.get("d", level)[0], c.height_d, 2e-3),
         (w.height.get("s", level)[0], c.height_f, 2e-3),
@@ -204,10 +237,10 @@ def test_rasterise(kernels: Device, scene: str, settings: TerrainSettings) -> No
     assert ((pairs[0][0] < 0) != (c.height_d < 0)).sum() <= 4
 
 
-def test_a_dirty_window_gives_the_bits_of_a_full_raster(kernels: Device) -> None:
+def test_a_dirty_window_gives_the_bits_of_a_full_raster(rasteriser: Device) -> None:
     """SPEC S15: rasterising only what changed changes nothing, on any level."""
     level, strokes = 3, SCENES["fifty"]
-    w, fresh = new_workspace(kernels, level), new_workspace(kernels, level)
+    w, fresh = new_workspace(rasteriser, level), new_workspace(rasteriser, level)
     w.load(strokes, SETTINGS)
     w.load(edited(strokes), SETTINGS)
     fresh.load(edited(strokes), SETTINGS)

@@ -82,33 +82,33 @@ def test_out_of_resources_on_a_dead_queue_is_a_lost_device(device: Device, monke
 @pytest.mark.parametrize("after", [0, 3, 40])
 @pytest.mark.parametrize(("code", "kind"), [(LOST, DeviceLostError), (INVALID_VALUE, DeviceError)])
 def test_a_fault_in_the_middle_of_a_solve(
-    used: Solver, monkeypatch: pytest.MonkeyPatch, after: int, code: int, kind: type[DeviceError]
+    fresh: Solver, monkeypatch: pytest.MonkeyPatch, after: int, code: int, kind: type[DeviceError]
 ) -> None:
     """SPEC S25: the error is typed, nothing of the failed solve is kept, the next one gives the same bits."""
-    expected, before = heights(used), held(used)
+    expected, before = heights(fresh), held(fresh)
     monkeypatch.setattr(devices, "_opened", dict(devices._opened))
     with monkeypatch.context() as patch:
         failing = Failing(cl.enqueue_nd_range_kernel, code, after)
         patch.setattr(cl, "enqueue_nd_range_kernel", failing)
         with pytest.raises(kind) as caught:
-            heights(used) if after else used.solve(STROKES[1:], SETTINGS, 2)
+            heights(fresh) if after else fresh.solve(STROKES[1:], SETTINGS, 2)
     assert failing.calls == after + 1
     assert isinstance(caught.value.__cause__, cl.Error)
-    assert used._pool.idle == []
-    assert held(used) == 0, "even though the error, with its frames, is still here"
-    assert np.array_equal(heights(used), expected)
-    assert held(used) == before
+    assert fresh._pool.idle == []
+    assert held(fresh) == 0, "even though the error, with its frames, is still here"
+    assert np.array_equal(heights(fresh), expected)
+    assert held(fresh) == before
 
 
-def test_a_fault_while_reading(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_while_reading(fresh: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC S25: drivers report late, where somebody waits."""
-    expected = heights(used)
+    expected = heights(fresh)
     with monkeypatch.context() as patch:
         patch.setattr(devices, "_opened", dict(devices._opened))
         patch.setattr(cl, "enqueue_copy", Failing(cl.enqueue_copy, LOST, 1))
         with pytest.raises(DeviceLostError):
-            heights(used)
-    assert np.array_equal(heights(used), expected)
+            heights(fresh)
+    assert np.array_equal(heights(fresh), expected)
 
 
 def test_build_failure(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:

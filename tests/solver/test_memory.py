@@ -68,35 +68,35 @@ def test_workspaces_that_nobody_uses_are_given_back(used: Solver) -> None:
     assert np.array_equal(heights(used, 1), expected)
 
 
-def test_memory_of_refinement_is_given_back(used: Solver) -> None:
+def test_memory_of_refinement_is_given_back(fresh: Solver) -> None:
     """SPEC S550: when no step was begun for long and none is under way; the next one gives the same bits."""
-    *_, done = used.steps(STROKES, SETTINGS, 1, basis=True)
+    *_, done = fresh.steps(STROKES, SETTINGS, 1, basis=True)
     assert isinstance(done, Done)
-    refiner, now, key = used.refiner(done.basis), time.monotonic(), TileKey(3, 4, 3)
-    assert used._refinery is not None
+    refiner, now, key = fresh.refiner(done.basis), time.monotonic(), TileKey(3, 4, 3)
+    assert fresh._refinery is not None
 
     def made() -> list[bytes]:
         return [tile.heights.tobytes() for tile in refiner.tiles([key]) if tile is not None]
 
-    expected, engine = made(), used._refinery._engine
+    expected, engine = made(), fresh._refinery._engine
     assert isinstance(engine, ClEngine)
     for seconds, empty in ((0, False), (REFINED_SECONDS - 1, False), (REFINED_SECONDS + 1, True)):
-        used.tidy(now + seconds)
+        fresh.tidy(now + seconds)
         assert engine.is_empty == empty == (len(refiner.cache) == 0)
     under_way = refiner.tiles([TileKey(3, 1, 1), TileKey(3, 7, 7)], lambda: True)
     while next(under_way) is None and not any(room.is_busy for room in engine._rooms):
         pass
-    used.tidy(now + 2 * REFINED_SECONDS)
-    used.tidy(now + 4 * REFINED_SECONDS)
+    fresh.tidy(now + 2 * REFINED_SECONDS)
+    fresh.tidy(now + 4 * REFINED_SECONDS)
     assert not engine.is_empty
     under_way.close()  # type: ignore[attr-defined]
     assert made() == expected
 
 
-def test_out_of_memory_in_the_middle_of_a_solve(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_out_of_memory_in_the_middle_of_a_solve(fresh: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC S26: many drivers allocate when a kernel first touches a buffer. Tried again while there is what to drop."""
-    expected = heights(used)
-    run = used.steps(STROKES, SETTINGS, 1)
+    expected = heights(fresh)
+    run = fresh.steps(STROKES, SETTINGS, 1)
     next(run)  # keeps a workspace of its own, so that there is an idle one beside that of the solve that fails
     with monkeypatch.context() as patch:
         failing = Failing(cl.enqueue_nd_range_kernel, NO_MEMORY, after=10, times=1)
@@ -104,47 +104,45 @@ def test_out_of_memory_in_the_middle_of_a_solve(used: Solver, monkeypatch: pytes
         for _ in run:
             pass
         assert failing.calls > 30
-    assert [w.top for w in used._pool.idle] == [1]
+    assert [w.top for w in fresh._pool.idle] == [1]
     with monkeypatch.context() as patch:
-        used._pool.idle.clear()
+        fresh._pool.idle.clear()
         patch.setattr(cl, "enqueue_nd_range_kernel", Failing(cl.enqueue_nd_range_kernel, NO_MEMORY, after=30))
         with pytest.raises(OutOfDeviceMemoryError):
-            heights(used)
-    assert np.array_equal(heights(used), expected)
+            heights(fresh)
+    assert np.array_equal(heights(fresh), expected)
 
 
-def test_out_of_memory_without_anything_to_drop(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
-    used._pool.idle.clear()
+def test_out_of_memory_without_anything_to_drop(fresh: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         failing = Failing(cl.Buffer, NO_MEMORY, after=9)
         patch.setattr(cl, "Buffer", failing)
         with pytest.raises(OutOfDeviceMemoryError, match="too little memory"):
-            heights(used)
-    assert held(used) == 0
-    assert heights(used).max() > 0
+            heights(fresh)
+    assert held(fresh) == 0
+    assert heights(fresh).max() > 0
 
 
 @pytest.mark.parametrize("limit", ["memory", "largest"])
-def test_a_plan_that_cannot_fit_allocates_nothing(used: Solver, monkeypatch: pytest.MonkeyPatch, limit: str) -> None:
+def test_a_plan_that_cannot_fit_allocates_nothing(fresh: Solver, monkeypatch: pytest.MonkeyPatch, limit: str) -> None:
     """SPEC S26."""
-    assert used._device is not None
-    limits = {"memory": used._device.memory, "largest": used._device.largest} | {limit: 40 << 20}
-    small = replace(used._device, name="small one", memory=limits["memory"], largest=limits["largest"])
-    monkeypatch.setattr(used, "_device", small)
-    used._pool.idle.clear()
-    assert heights(used, 1).max() > 0
+    assert fresh._device is not None
+    limits = {"memory": fresh._device.memory, "largest": fresh._device.largest} | {limit: 40 << 20}
+    small = replace(fresh._device, name="small one", memory=limits["memory"], largest=limits["largest"])
+    monkeypatch.setattr(fresh, "_device", small)
+    assert heights(fresh, 1).max() > 0
     with monkeypatch.context() as patch:
         patch.setattr(cl, "Buffer", Failing(cl.Buffer, INVALID_VALUE))
         with pytest.raises(OutOfDeviceMemoryError, match=r"4097².*small one.* MiB"):
             workspaces.new_workspace(small, 6)
-    assert held(used) == workspaces.planned_bytes(small, 1)[0]
+    assert held(fresh) == workspaces.planned_bytes(small, 1)[0]
 
 
-def test_what_is_held_counts(used: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_held_counts(fresh: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC S26: two workspaces do not fit where one does; when the first is gone the second does."""
-    assert used._device is not None
-    needed = workspaces.planned_bytes(used._device, 2)[0]
-    tight = replace(used._device, name="tight one", memory=int(1.8 * needed / workspaces.SHARE))
+    assert fresh._device is not None
+    needed = workspaces.planned_bytes(fresh._device, 2)[0]
+    tight = replace(fresh._device, name="tight one", memory=int(1.8 * needed / workspaces.SHARE))
     first = workspaces.new_workspace(tight, 2)
     with pytest.raises(OutOfDeviceMemoryError, match="left"):
         workspaces.new_workspace(tight, 2)
@@ -154,9 +152,9 @@ def test_what_is_held_counts(used: Solver, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.parametrize("top", [0, 1, 3])
-def test_the_plan_is_what_is_allocated(used: Solver, monkeypatch: pytest.MonkeyPatch, top: int) -> None:
+def test_the_plan_is_what_is_allocated(fresh: Solver, monkeypatch: pytest.MonkeyPatch, top: int) -> None:
     """SPEC S26: within the tables and weights, a few kilobytes."""
-    assert used._device is not None
+    assert fresh._device is not None
     sizes = []
 
     def counted(context: Any, flags: int, size: int = 0, hostbuf: Any = None) -> Any:
@@ -164,8 +162,8 @@ def test_the_plan_is_what_is_allocated(used: Solver, monkeypatch: pytest.MonkeyP
         return cl._cl.Buffer(context, flags, size, hostbuf)
 
     monkeypatch.setattr(cl, "Buffer", counted)
-    workspaces.new_workspace(used._device, top)
-    planned, largest = workspaces.planned_bytes(used._device, top)
+    workspaces.new_workspace(fresh._device, top)
+    planned, largest = workspaces.planned_bytes(fresh._device, top)
     assert 0 <= sum(sizes) - planned < 100_000
     assert largest == max(sizes)
 
@@ -173,10 +171,10 @@ def test_the_plan_is_what_is_allocated(used: Solver, monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("level", range(3, MAX_LEVEL + 1))
 @pytest.mark.parametrize("strips", [1, 8])
 @pytest.mark.parametrize("based", [False, True])
-def test_what_solves_are_shared_out_by_is_about_the_plan(used: Solver, strips: int, level: int, based: bool) -> None:
+def test_what_solves_are_shared_out_by_is_about_the_plan(fresh: Solver, strips: int, level: int, based: bool) -> None:
     """SPEC S26: a base and a preview workspace included."""
-    assert used._device is not None
-    device = replace(used._device, strips=strips)
+    assert fresh._device is not None
+    device = replace(fresh._device, strips=strips)
     planned = workspaces.planned_bytes(device, level, based)[0]
     planned += (
         workspaces.planned_bytes(device, grid.PREVIEW_WORKSPACE_LEVEL, based)[0]

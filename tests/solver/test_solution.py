@@ -25,7 +25,7 @@ DIRECT = [
     *((name, SETTINGS, 2) for name in SCENES),
     ("one", ENDLESS, 2), ("fifty", ENDLESS, 2), ("tiny", ENDLESS, 2), ("loops", ENDLESS, 1),
     ("five", PINNED, 2), ("cross", TerrainSettings(border="pinned", reach_m=None), 2),
-    ("fifty", SETTINGS, 3), ("five", SETTINGS, 0), ("cross", SETTINGS, 1),
+    ("cross", SETTINGS, 3), ("five", SETTINGS, 0), ("cross", SETTINGS, 1),
 ]  # fmt: skip
 
 
