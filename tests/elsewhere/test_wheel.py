@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -16,9 +17,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from esker import Stroke, connect, resources
 from esker.process import system
+from esker.render.pictures import previews
 from tests.elsewhere.test_elsewhere import private_link
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -143,7 +146,8 @@ def _picture(link: str) -> None:
                 return
             assert code == "busy"
         else:
-            assert data[:2] == b"\xff\xd8"
+            with Image.open(io.BytesIO(data)) as made:
+                assert (made.format, made.size) == ("JPEG", (previews.WIDTH, previews.HEIGHT))
             return
     pytest.fail("the picture does not come")
 

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import tomllib
 from fnmatch import fnmatch
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,14 +27,21 @@ def instructions(word: str) -> list[list[str]]:
     return [[part for part in shlex.split(line) if not part.startswith("--")] for line in found]
 
 
+IGNORED = text(".dockerignore").splitlines()
+
+
+@cache
+def is_named(path: str) -> bool:
+    """Whether .dockerignore names a path itself: patterns begin at the root unless with **/."""
+    name = Path(path).name
+    return any(
+        fnmatch(path, line) or (line.startswith("**/") and fnmatch(name, line.removeprefix("**/"))) for line in IGNORED
+    )
+
+
 def ignored(path: str) -> bool:
-    """Whether .dockerignore keeps a path out of the build: patterns begin at the root unless with **/."""
-    for line in text(".dockerignore").splitlines():
-        for folder in (path, *(str(above) for above in Path(path).parents)):
-            deep = line.startswith("**/") and fnmatch(Path(folder).name, line.removeprefix("**/"))
-            if deep or fnmatch(folder, line):
-                return True
-    return False
+    """Whether .dockerignore keeps a path, or a folder that it lies in, out of the build."""
+    return any(is_named(each) for each in (path, *(str(above) for above in Path(path).parents)))
 
 
 CONTEXT = [path for path in files() if not ignored(path)]
