@@ -21,7 +21,7 @@ PEOPLE := tests/e2e
 DRAWN := tests/golden tests/gpu tests/render
 COMPUTED := tests/solver tests/golden tests/gpu tests/synthesis tests/patchwork tests/flow tests/render tests/property
 SOLVED := tests/solver tests/synthesis
-ROOMS := tests/sync
+ROOMS := tests/sync tests/cluster tests/store
 # Python shows a traceback when Ctrl-C comes while it starts itself; held back, the signal waits for our first line.
 HOLDING := $(shell env --block-signal=INT true 2>/dev/null && echo env --block-signal=INT)
 SOURCES := $(shell find frontend/src shaders frontend/public -type f 2>/dev/null)
