@@ -6,6 +6,9 @@ scene that fails here is not made simpler: the search does that.
 
 from __future__ import annotations
 
+import json
+import zlib
+
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 
@@ -17,10 +20,14 @@ NUMPY_EVERY = 4
 """One scene of so many is solved by NumPy, too, but on level 2: it takes ten times as long as OpenCL."""
 
 
+def is_for_numpy(scene: _direct.Scene) -> bool:
+    """Whether NumPy solves a scene, too. The scene itself says it: one that fails is run a second time."""
+    return scene.level < 2 and zlib.crc32(json.dumps(scene.document()).encode()) % NUMPY_EVERY == 0
+
+
 @pytest.mark.parametrize(("level", "cases"), CASES)
 def test_settled_ground_is_that_of_direct_solves(level: int, cases: int) -> None:
     """The direct solve of a scene serves all solvers that are compared with it."""
-    seen = 0
 
     @settings(
         max_examples=cases,
@@ -32,11 +39,9 @@ def test_settled_ground_is_that_of_direct_solves(level: int, cases: int) -> None
     )
     @given(_adversary.scenes(level))
     def every(scene: _direct.Scene) -> None:
-        nonlocal seen
         solvers = dict(search.solvers())
-        if "opencl" in solvers and (level == 2 or seen % NUMPY_EVERY):
+        if "opencl" in solvers and not is_for_numpy(scene):
             del solvers["numpy"]
-        seen += 1
         found = _direct.measure(scene, solvers)
         assert max(found.values()) <= 1, (found, scene.document())
 

@@ -41,6 +41,6 @@ def fresh(request: pytest.FixtureRequest) -> Solver:
 
 @pytest.fixture
 def used(fresh: Solver) -> Solver:
-    """The same with an idle workspace of level 2, as it has solved."""
+    """A solver that has solved, with an idle workspace of level 2, on a device of a name of its own."""
     fresh.solve(STROKES, SETTINGS, 2)
     return fresh

@@ -198,23 +198,38 @@ async function rendererFor(shot: Shot): Promise<SceneRenderer> {
   return made;
 }
 
-/** Draws until the renderer rests; returns the last frame's figures with the number of frames. */
-async function shoot(shot: Shot): Promise<FrameStats & { frames: number; description: string; ms: number }> {
-  const used = await rendererFor(shot);
-  const s = scene(shot, shot.width ?? 1280, shot.height ?? 720);
-  const began = performance.now();
+/**
+ * Draws a scene until the renderer rests; returns the last frame's figures with the number of frames. `drawn` is called in
+ * the task that drew a frame: a WebGPU canvas keeps its picture only until that ends.
+ */
+async function drawToRest(
+  used: SceneRenderer,
+  asked: Scene,
+  drawn: () => void = () => {},
+): Promise<FrameStats & { frames: number }> {
+  let cpuMs = -1;
   for (let frames = 1; ; frames += 1) {
-    const stats = used.render(s);
+    const stats = used.render(asked);
+    // A frame that was skipped reports the figures of the last one.
+    if (stats.cpuMs !== cpuMs) drawn();
+    cpuMs = stats.cpuMs;
     await new Promise((done) => setTimeout(done, 16));
-    if (!stats.busy && frames > 2)
-      return { ...stats, frames, description: used.description, ms: performance.now() - began };
+    if (!stats.busy && frames > 2) return { ...stats, frames };
     if (frames > 9000) throw new Error("the renderer never rests");
   }
 }
 
+/** Draws a shot until the renderer rests, and tells how long that took. */
+async function shoot(shot: Shot): Promise<FrameStats & { frames: number; description: string; ms: number }> {
+  const used = await rendererFor(shot);
+  const began = performance.now();
+  const stats = await drawToRest(used, scene(shot, shot.width ?? 1280, shot.height ?? 720));
+  return { ...stats, description: used.description, ms: performance.now() - began };
+}
+
 let pictures = 0;
 
-/** The picture of a shot as a PNG data URL. A WebGPU canvas keeps what is drawn until the task ends: each is read at once. */
+/** The picture of a shot at rest as a PNG data URL. */
 async function picture(shot: Shot): Promise<string> {
   const used = await rendererFor(shot);
   const canvas = document.querySelector<HTMLCanvasElement>(`#${canvasOf(shot)}`)!;
@@ -222,16 +237,10 @@ async function picture(shot: Shot): Promise<string> {
   pictures += 1;
   const anew = { ...asked, tauPx: asked.tauPx * (1 + 1e-9 * pictures) }; // nothing that shows, but it is drawn once at least
   let url = "";
-  let cpuMs = -1;
-  for (let frames = 1; ; frames += 1) {
-    const stats = used.render(anew);
-    // A frame that was skipped reports the figures of the last one.
-    if (stats.cpuMs !== cpuMs) url = canvas.toDataURL("image/png");
-    cpuMs = stats.cpuMs;
-    await new Promise((done) => setTimeout(done, 16));
-    if (frames > 2 && !stats.busy) return url;
-    if (frames > 9000) throw new Error("the renderer never rests");
-  }
+  await drawToRest(used, anew, () => {
+    url = canvas.toDataURL("image/png");
+  });
+  return url;
 }
 
 /** The first picture after a shot got another look, PNG data URL; what the look needs is not made yet. */
