@@ -17,6 +17,8 @@ from esker import contract as c
 from esker.document import archive
 from esker.document.ops import Refusal
 from esker.fairness.shares import Rates
+from esker.lesson import classes
+from esker.store.classes import ClassStore
 from tests.store.engines import sqlite
 from tests.sync.harness import PATIENCE, LiveServer, Peer, set_op, stroke
 
@@ -95,6 +97,43 @@ def test_a_code_asks_for_a_name_and_gives_a_copy(server: LiveServer, teacher: Te
     lessons = [m for m in with_ada.seen if m["type"] == "class"]
     assert told["type"] in ("class", "progress")
     assert (lessons[0]["number"], lessons[0]["names"], lessons[0]["frozen"]) == (1, ["Ada"], False)
+
+
+def test_a_class_that_comes_in_reads_and_writes_its_beginning_once(
+    server: LiveServer, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC L166: however many there are, and copies are what they were; a new beginning is read anew."""
+    done: list[str] = []
+    read, written = ClassStore.document, classes.document_json
+
+    def counted(store: ClassStore, lesson: str) -> Any:
+        done.append("read")
+        return read(store, lesson)
+
+    def noted(document: c.Document) -> str:
+        done.append("written")
+        return written(document)
+
+    monkeypatch.setattr(ClassStore, "document", counted)
+    monkeypatch.setattr(classes, "document_json", noted)
+    own = server.join(teacher.terrain, teacher.secret, "t")
+    own.ops(("t:1", stroke("s1")), ("t:2", {"type": "stroke.finish", "stroke": "s1"}))
+    own.wait("ack")
+    assert teacher.ask("push") == (200, {"changed": 0})
+    done.clear()
+    pupils = [Pupil(teacher, name) for name in ("Ada", "Ben", "Cleo")]
+    assert done == ["read", "written"]
+    texts = [server.http("GET", f"/api/terrains/{one.terrain}/document", secret=one.seat)[1] for one in pupils]
+    assert len({one.terrain for one in pupils}) == 3
+    for one, text in zip(pupils, texts, strict=True):
+        assert text.pop("id") == one.terrain
+        assert [each["id"] for each in text["strokes"]] == ["s1"]
+    assert texts[0] == texts[1] == texts[2]
+    own.ops(("t:3", stroke("s2")), ("t:4", {"type": "stroke.finish", "stroke": "s2"}))
+    own.wait("ack")
+    assert teacher.ask("push") == (200, {"changed": 3})
+    late = Pupil(teacher, "Dan")
+    assert _strokes(server, late.terrain, late.seat) == {"s1", "s2"}
 
 
 def test_the_same_seat_is_the_same_copy(server: LiveServer, teacher: Teacher) -> None:

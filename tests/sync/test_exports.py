@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -196,6 +197,35 @@ def test_files_are_kept_for_a_while_and_within_bounds(live: LiveServer) -> None:
     service._now = lambda: time.monotonic() + exports.KEPT_SECONDS + 1
     begin(live, terrain, secret)
     assert live.http("GET", f"/api/terrains/{terrain}/exports/{jobs[2]}", secret=secret)[1]["code"] == "no_export"
+
+
+def test_what_is_being_given_to_other_servers_is_not_forgotten(live: LiveServer) -> None:
+    """SPEC X390: it took so long that everything else that was made by then is."""
+    service = live.assembly.exports
+    assert service is not None
+    given, may_end = threading.Event(), threading.Event()
+
+    async def keep(terrain: str, path: Path, *_: Any) -> bool:
+        given.set()
+        await asyncio.to_thread(may_end.wait, 60)
+        assert path.exists()
+        return False
+
+    terrain, secret = live.create()
+    first = begin(live, terrain, secret)[1]["id"]
+    wait(live, terrain, secret, first, "done")
+    service._kept.keep = keep  # type: ignore[method-assign, assignment]
+    second = begin(live, terrain, secret)[1]["id"]
+    assert given.wait(60)
+    service._now = lambda: time.monotonic() + exports.KEPT_SECONDS + 1
+    assert live.http("GET", f"/api/terrains/{terrain}/exports/{second}", secret=secret)[1]["stage"] == "done"
+    assert service.has(terrain)
+    assert folders(live) == [second], "only what has ended goes"
+    may_end.set()
+    while service._jobs[second].ended is None:
+        time.sleep(0.01)
+    status, _ = live.http("GET", f"/api/terrains/{terrain}/exports/{second}/file", secret=secret)
+    assert status == 200
 
 
 def test_the_estimate_follows_the_pace_of_this_server(live: LiveServer, maker: Maker) -> None:

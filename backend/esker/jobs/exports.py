@@ -88,7 +88,8 @@ class Job:
     seat: Place
     """A place among those that the terrain has."""
     task: asyncio.Task[None] | None = None
-    ended: float = 0.0
+    ended: float | None = None
+    """When its file may begin to grow old: what is being given to other servers is done, and has not ended."""
     is_shared: bool = False
     """Whether other servers have what was made, too."""
 
@@ -293,12 +294,14 @@ class Exports:
         """Removes what was kept long enough and, beyond ``kept_bytes``, the oldest files of whichever address has the
         most; never the newest of all."""
         late = self._now() - self._kept_seconds
-        over = sorted((job for job in self._jobs.values() if job.over), key=lambda job: job.ended)
-        for job in over:
-            if job.ended < late:
+        ends = sorted(
+            ((job.ended, job) for job in self._jobs.values() if job.ended is not None), key=lambda end: end[0]
+        )
+        for ended, job in ends:
+            if ended < late:
                 self._forget(job)
-        newest = over[-1:]
-        over = [job for job in over if job.ended >= late]
+        newest = [job for _, job in ends[-1:]]
+        over = [job for ended, job in ends if ended >= late]
         while over and sum(job.status.bytes for job in over) > self._kept_bytes:
             kept: Counter[str] = Counter()
             for job in over:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
-from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
 from functools import partial
@@ -18,10 +17,12 @@ from weakref import WeakValueDictionary
 
 from esker import contract as c
 from esker.document.ops import Refusal, StrokeSet
+from esker.document.wire import document_json
 from esker.errors import Cannot
 from esker.fairness.shares import Who
 from esker.fairness.turns import SERVER, Turns
-from esker.lesson import merge
+from esker.lesson import beginnings, merge
+from esker.lesson.beginnings import Beginning, Beginnings
 from esker.session.births import born_as
 from esker.session.room.core import Denied
 from esker.session.room.hub import Hub
@@ -52,8 +53,6 @@ MOST_KEPT: Final = 40
 ORDERS, ORDERS_WAITING = 4, 8
 """What teachers do to all copies of their classes: so much at a time on the server, of which one address has one; and
 what may wait of one address."""
-BEGINNINGS, BEGINNING_STROKES = 8, 500
-"""The memory holds the beginnings of copies of so many classes, light ones only."""
 PLANS: Final = 3
 """What is to be done to a copy is planned in a thread so often, while somebody draws in it; then in the event loop."""
 
@@ -76,8 +75,7 @@ class Classes:
         """What each class is shown, by class: the number of the copy, and how it is reached."""
         self._locks: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
         self._orders = Turns(ORDERS, 1, ORDERS_WAITING)
-        self._beginnings: OrderedDict[tuple[str, int], c.Document] = OrderedDict()
-        """What copies begin as, by class and clock."""
+        self._beginnings = Beginnings()
         self.hear: list[Callable[[str], object]] = []
         """Who is told that something of a class changed."""
         hub.class_of = self.facts_of
@@ -199,13 +197,17 @@ class Classes:
             pupil = Pupil(link.id, lesson.id, number, name, self.store.now())
             await _done(self.hub.journal.submit(self.store.seating(insert, pupil), lesson.terrain))
             return
-        start = await self.beginning(lesson, who)
-        settings = start.settings.model_copy(update={"title": lesson.title})
-        born = born_as(start.model_copy(update={"settings": settings}))
+        start = await self._beginning(lesson, who)
+        settings = start.document.settings.model_copy(update={"title": lesson.title})
+        born = born_as(start.document.model_copy(update={"settings": settings}))
+        text = start.text_of(born)
+        if text is None:
+            text = await self.hub.read(who, document_json, born)
+            start.keep(born, text)
         link, _, insert = self.hub.access.make(born.id, "edit", name, None, secret)
         pupil = Pupil(link.id, lesson.id, number, name, self.store.now())
         seated = self.store.seating(insert, pupil, born.id)
-        await self.hub.births.write(born, seated, who, lesson.terrain)
+        await self.hub.births.write(born, seated, who, lesson.terrain, text)
 
     # --- what pages are told ------------------------------------------------------------------------------------
 
@@ -298,17 +300,18 @@ class Classes:
 
     async def beginning(self, lesson: Class, who: Who) -> c.Document:
         """What copies of a class begin as, read for ``who``. Raises Cannot, Denied."""
-        key = lesson.id, lesson.clock
-        if (held := self._beginnings.get(key)) is not None:
-            return held
-        start = await self.hub.read(who, self.store.document, lesson.id)
-        if start is None:
-            raise Cannot(404, "no_class", OVER)
-        if len(start.strokes) + len(start.layers) <= BEGINNING_STROKES:
-            self._beginnings[key] = start
-            while len(self._beginnings) > BEGINNINGS:
-                self._beginnings.popitem(last=False)
-        return start
+        return (await self._beginning(lesson, who)).document
+
+    async def _beginning(self, lesson: Class, who: Who) -> Beginning:
+        held = self._beginnings.find(lesson.id, lesson.clock)
+        if held is None:
+            read = await self.hub.read(who, self.store.document, lesson.id)
+            if read is None:
+                raise Cannot(404, "no_class", OVER)
+            held = Beginning(*read)
+            self._beginnings.hold(lesson.id, lesson.clock, held)
+            asyncio.get_running_loop().call_later(beginnings.SECONDS + 1.0, self._beginnings.forget_old)
+        return held
 
     async def _each(self, copies: Sequence[Copy], plan: Callable[[StrokeSet], list[c.SimpleOp]], who: Who) -> int:
         """Does in each copy what ``plan`` says of it, one copy after another, for ``who``. Raises Cannot once all were

@@ -44,25 +44,32 @@ class Births:
         also: Callable[[Any], Any] | None = None,
         who: Who = SERVER,
         by: str | None = None,
+        text: str | None = None,
     ) -> None:
         """Writes a new terrain with what ``also`` writes into the database, or neither. ``by``: the terrain whose rows
-        ``also`` writes beside those of the new one.
+        ``also`` writes beside those of the new one. ``text``: its document as JSON, where that is there already.
 
         Raises Cannot (429), shares.Full, store.journal.Unwritable, and what ``also`` raises.
         """
         if who == SERVER:  # what the server makes for itself is empty, and waits for nobody
             await asyncio.wrap_future(self._journal.create(born, also, by))
             return
-        text = await self.encode(born, who)
+        if text is None:
+            text = await self.encode(born, who)
+        else:
+            self._count(text, who)
         async with self._turns.turn(who):
             await asyncio.wrap_future(self._journal.create(born, also, by, text))
 
     async def encode(self, document: c.Document, who: Who) -> str:
         """A document that is to be written, as JSON; it counts for ``who``. Raises Cannot (429), shares.Full."""
         text = await self._reading.run(who, document_json, document)
+        self._count(text, who)
+        return text
+
+    def _count(self, text: str, who: Who) -> None:
         if not self.rates.take(Who(who.address), self._now(), len(text)):
             raise Cannot(429, "rate_limited", TOO_MUCH)
-        return text
 
 
 def born_as(document: c.Document) -> c.Document:

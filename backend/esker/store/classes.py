@@ -112,10 +112,10 @@ class ClassStore:
         found = self._one("code=? AND ended IS NULL", code.strip().upper().replace(" ", "").replace("-", ""))
         return found if found is not None and found.code_until > self.now() else None
 
-    def document(self, lesson: str) -> c.Document | None:
-        """What a copy begins as. Blocks for as long as a document takes to be read."""
+    def document(self, lesson: str) -> tuple[c.Document, int] | None:
+        """What a copy begins as, and how many characters it has. Blocks for as long as a document takes to be read."""
         row = self._db.execute("SELECT document FROM classes WHERE id=?", (lesson,)).fetchone()
-        return None if row is None else read_document(row[0])
+        return None if row is None else (read_document(row[0]), len(row[0]))
 
     def set_document(self, lesson: str, clock: int, document: str) -> Future[None]:
         """From now on copies begin as this document (JSON), of the clock ``clock`` of the class's terrain."""
