@@ -17,9 +17,10 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from threading import Event
 from typing import Any, Final
 
-from esker.server import run
+from esker.server import first_build, run
 from esker.server.settings import Settings
 from esker.session.room import core
 from esker.store import journal
@@ -131,7 +132,8 @@ def life(task: dict[str, Any], log: str) -> None:
 
 
 def main(log: str) -> None:
-    """One fork for each line."""
+    """One fork for each line. The compiled loops are loaded before: each server would load them for itself."""
+    first_build.have_loops(Event(), Event())
     for line in sys.stdin:
         child = os.fork()
         if child == 0:
