@@ -16,8 +16,8 @@ import pytest
 from esker import contract as c
 from esker.document import archive
 from esker.document.ops import Refusal
+from esker.document.wire import document_json
 from esker.fairness.shares import Rates
-from esker.lesson import classes
 from esker.store.classes import ClassStore
 from tests.store.engines import sqlite
 from tests.sync.harness import PATIENCE, LiveServer, Peer, set_op, stroke
@@ -104,7 +104,7 @@ def test_a_class_that_comes_in_reads_and_writes_its_beginning_once(
 ) -> None:
     """SPEC L166: however many there are, and copies are what they were; a new beginning is read anew."""
     done: list[str] = []
-    read, written = ClassStore.document, classes.document_json
+    read = ClassStore.document
 
     def counted(store: ClassStore, lesson: str) -> Any:
         done.append("read")
@@ -112,10 +112,10 @@ def test_a_class_that_comes_in_reads_and_writes_its_beginning_once(
 
     def noted(document: c.Document) -> str:
         done.append("written")
-        return written(document)
+        return document_json(document)
 
     monkeypatch.setattr(ClassStore, "document", counted)
-    monkeypatch.setattr(classes, "document_json", noted)
+    monkeypatch.setattr("esker.lesson.classes.document_json", noted)
     own = server.join(teacher.terrain, teacher.secret, "t")
     own.ops(("t:1", stroke("s1")), ("t:2", {"type": "stroke.finish", "stroke": "s1"}))
     own.wait("ack")

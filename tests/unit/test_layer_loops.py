@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,8 @@ from esker.solve.opencl import prepare
 from esker.solve.opencl.pocl import home
 from esker.store.grids import GridStore
 
+ROOT = Path(__file__).resolve().parents[2]
+
 
 @pytest.fixture
 def laid(tmp_path: Path) -> tuple[GridStore, c.Layer]:
@@ -32,8 +33,8 @@ def laid(tmp_path: Path) -> tuple[GridStore, c.Layer]:
 def test_they_are_compiled_once_on_a_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     asked: list[list[str]] = []
 
-    def bounded(arguments: list[str], look: Callable[[], None] = lambda: None, stopped: Any = None) -> dict[str, Any]:
-        del look, stopped
+    def bounded(arguments: list[str], stopped: Any, times: float) -> dict[str, Any]:
+        del stopped, times
         asked.append(arguments)
         return {"loops": arguments[-1]}
 
@@ -42,6 +43,20 @@ def test_they_are_compiled_once_on_a_machine(monkeypatch: pytest.MonkeyPatch, tm
     for _ in range(2):
         first_build.have_layer_loops(threading.Event())
     assert asked == [["loops", "layers"]]
+
+
+def test_they_have_more_time_than_kernels(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """SPEC H565: a child that was ended while it compiled left the rest to the server, once for each start."""
+    monkeypatch.setattr(home, "root", lambda: tmp_path)
+    monkeypatch.setattr(prepare, "MODULE", "tests.solver.breaking_build")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setenv("BREAK", "turns")
+    monkeypatch.setattr(prepare, "SECONDS", 0.06)
+    first_build.have_layer_loops(threading.Event())
+    assert "loops of layers: not compiled within 1 s" in caplog.text
+    assert list(tmp_path.iterdir()) == [], "the next server tries it again"
 
 
 def test_what_the_child_runs_is_ground() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +19,8 @@ def children(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[list[str]]
     """What children were asked for; none is started. What was compiled is noted in an empty folder."""
     asked: list[list[str]] = []
 
-    def bounded(arguments: list[str], look: Callable[[], None] = lambda: None, stopped: Any = None) -> dict[str, Any]:
-        del look
+    def bounded(arguments: list[str], stopped: Any, times: float) -> dict[str, Any]:
+        del times
         if stopped is not None and stopped.is_set():
             raise prepare.Stopped
         asked.append(arguments)

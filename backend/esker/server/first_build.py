@@ -39,6 +39,9 @@ TILES: Final = "tiles"
 RIVERS: Final = "rivers"
 LAYERS: Final = "layers"
 SCENE_LEVEL: Final = 2
+LOOPS_TIMES: Final = 10.0
+"""Loops may take so many times as long as kernels: no driver can hang in them. Those of layers take a minute of a fast
+core, and what a child leaves undone the server compiles itself, with its interpreter's lock."""
 ROWS: Final = "1-1-1-goffs0-smallgrid"
 """The name that PoCL gives the shape of the launches of row-wise kernels."""
 log = logging.getLogger("esker.server.first_build")
@@ -207,7 +210,10 @@ def _compiled(what: str, stopped: threading.Event, begins: Callable[[], None]) -
         return True
     begins()
     try:
-        if "failed" not in prepare.bounded(["loops", what], stopped=stopped):
+        told = prepare.bounded(["loops", what], stopped=stopped, times=LOOPS_TIMES)
+        if "failed" in told:
+            log.warning("loops of %s: %s; the server compiles what is missing", what, told["failed"])
+        else:
             with suppress(OSError):
                 record.parent.mkdir(parents=True, exist_ok=True)
                 record.touch()

@@ -249,11 +249,15 @@ def _built(one: cpu.Level, order: dict[str, Any], tell: Tell, stopped: threading
 
 
 def bounded(
-    arguments: list[str], look: Callable[[], None] = lambda: None, stopped: threading.Event | None = None
+    arguments: list[str],
+    look: Callable[[], None] = lambda: None,
+    stopped: threading.Event | None = None,
+    times: float = 1.0,
 ) -> dict[str, Any]:
     """Runs ``esker.server.first_build`` until it ends or is past its bounds; its answer, or ``failed`` with the reason.
 
-    ``look`` is called now and then. Raises Stopped, after the child and its own children have ended.
+    ``look`` is called now and then. ``times``: so many times as long as kernels may take. Raises Stopped, after the
+    child and its own children have ended.
     """
     command = [sys.executable, "-m", MODULE, *arguments]
     pipe = subprocess.PIPE
@@ -266,7 +270,7 @@ def bounded(
         for reader in readers:
             reader.start()
         try:
-            why = _watched(child, look, stopped)
+            why = _watched(child, look, stopped, times)
         except BaseException:
             _end(child)
             raise
@@ -292,9 +296,11 @@ def _environment() -> dict[str, str]:
     return os.environ | {"PYTHONPATH": path, home.ROOT: str(home.root())}
 
 
-def _watched(child: subprocess.Popen[bytes], look: Callable[[], None], stopped: threading.Event | None) -> str | None:
+def _watched(
+    child: subprocess.Popen[bytes], look: Callable[[], None], stopped: threading.Event | None, times: float
+) -> str | None:
     """Waits for the child. Returns why it has to be ended, None when it ended by itself. Raises Stopped."""
-    end = time.monotonic() + PATIENCE
+    most, end = SECONDS * times, time.monotonic() + PATIENCE * times
     while True:
         with contextlib.suppress(subprocess.TimeoutExpired):
             child.wait(LOOK_EVERY)
@@ -303,8 +309,8 @@ def _watched(child: subprocess.Popen[bytes], look: Callable[[], None], stopped: 
             raise Stopped
         look()
         taken, resident = usage(child.pid)
-        if taken > SECONDS or time.monotonic() > end:
-            return f"not compiled within {SECONDS:.0f} s"
+        if taken > most or time.monotonic() > end:
+            return f"not compiled within {most:.0f} s"
         if resident > BYTES:
             return f"the compiler took more than {BYTES / 2**30:.1f} GiB"
 
