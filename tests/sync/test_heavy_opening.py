@@ -101,11 +101,13 @@ def test_a_bystander_has_his_turns_while_a_heavy_file_is_taken_in(
 ) -> None:
     (tmp_path / "t.esker").write_bytes(archive.dumps(heavy))
     reads: list[Any] = []
-    turn: Any = contextlib.nullcontext()
     work = tmp_path / "work"
     work.mkdir()
     turns = _turns_while(
-        reads, monkeypatch, "esker.server.upload", lambda: read_archive(tmp_path / "t.esker", work, turn)
+        reads,
+        monkeypatch,
+        "esker.server.upload",
+        lambda: read_archive(tmp_path / "t.esker", work, contextlib.nullcontext),
     )
     assert reads[-1] == heavy
     assert turns >= TURNS

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import io
 import json
 import zipfile
@@ -19,6 +20,7 @@ from esker.document.archive import ArchiveError
 from esker.document.ops import Refusal, check_document
 from esker.patchwork.raster import rasters
 from esker.patchwork.raster.rasters import Raster
+from esker.server import upload
 from esker.server.upload import read_archive
 from esker.store.grids import GridStore
 
@@ -168,7 +170,7 @@ def test_the_process_that_reads_makes_rasters(document: c.Document, grids: dict[
     work = store.work()
     path = work / "a.esker"
     path.write_bytes(archive.dumps(document, grids))
-    assert asyncio.run(read_archive(path, work, asyncio.Semaphore(1))) == document
+    assert asyncio.run(read_archive(path, work, lambda: asyncio.Semaphore(1))) == document
     for digest, raster in grids.items():
         store.keep(work / digest, digest)
         kept = store.read(digest)
@@ -178,7 +180,46 @@ def test_the_process_that_reads_makes_rasters(document: c.Document, grids: dict[
     name = f"grids__{document.layers[0].content}_dot_npy"
     path.write_bytes(_again(path.read_bytes(), **{name: _npy(HEIGHTS + 9)}))
     with pytest.raises(ArchiveError, match="not the one"):
-        asyncio.run(read_archive(path, store.work(), asyncio.Semaphore(1)))
+        asyncio.run(read_archive(path, store.work(), lambda: asyncio.Semaphore(1)))
+
+
+def test_the_first_file_with_grids_on_a_machine_waits_for_their_loops(
+    document: c.Document, grids: dict[str, Raster], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC H566: compiled by its reader they take longer than it may; and a file without any waits for none."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "loops"))  # nothing is compiled on this machine
+    said: list[str] = []
+    read = upload._read
+
+    async def noted(*arguments: Any) -> Any:
+        said.append(str(arguments[3]))
+        return await read(*arguments)
+
+    async def compiled() -> None:
+        said.append("compiled")
+        monkeypatch.delenv("NUMBA_CACHE_DIR")
+
+    monkeypatch.setattr(upload, "_read", noted)
+    monkeypatch.setattr("esker.importing.warm.begin", object)
+    monkeypatch.setattr("esker.importing.warm.loops", compiled)
+    path = tmp_path / "a.esker"
+    path.write_bytes(archive.dumps(document.model_copy(update={"layers": (), "deleted_layers": ()})))
+    assert asyncio.run(read_archive(path, tmp_path, contextlib.nullcontext)).layers == ()
+    assert said == ["coming"]
+    path.write_bytes(archive.dumps(document, grids))
+    assert asyncio.run(read_archive(path, tmp_path, contextlib.nullcontext)) == document
+    assert said[1:] == ["coming", "compiled", str(upload._kept())]
+
+
+def test_a_reader_that_has_to_compile_has_time_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC H566: where no disk keeps loops, say."""
+    path = tmp_path / "a.esker"
+    path.write_bytes(b"")
+    monkeypatch.setattr("esker.importing.warm.record", lambda: tmp_path / "none")
+    assert upload._kept() is upload.Loops.MISSING
+    assert upload.cpu_seconds(path, upload.Loops.MISSING) >= upload.cpu_seconds(path) + 300
+    monkeypatch.setattr("esker.importing.warm.record", lambda: path)
+    assert upload._kept() is upload.Loops.KEPT
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,7 @@ def test_what_the_interpreter_needs_is_not_where_it_runs(monkeypatch: pytest.Mon
 
 
 CHILDREN = {
-    "reading a terrain file": "from esker.server import upload; upload.bound(Path(sys.argv[1]))",
+    "reading a terrain file": "from esker.server import upload; upload.bound(Path(sys.argv[1]), upload.Loops.KEPT)",
     "reading an elevation file": "from esker.importing import limits; limits.apply('inspect')",
     "exporting": "from esker.api import export_child as made; made._step_back()",
     "drawing": "from esker.render.pictures import previews\na, b = previews.multiprocessing.Pipe(False)\n"
@@ -156,6 +156,6 @@ def test_who_reads_a_terrain_file_gets_nothing_of_the_server_s_environment(
 
     monkeypatch.setattr(asyncio, "create_subprocess_exec", start)
     with pytest.raises(OSError, match="not started"):
-        asyncio.run(upload.read_archive(tmp_path, tmp_path, contextlib.nullcontext()))
+        asyncio.run(upload.read_archive(tmp_path, tmp_path, contextlib.nullcontext))
     assert "SOMEBODYS_KEY" not in started["env"]
     assert "PATH" in started["env"]

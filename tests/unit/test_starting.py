@@ -267,9 +267,10 @@ def test_it_stops_at_every_moment(moment: str, number: signal.Signals, tmp_path:
 def test_children_end_when_nobody_holds_their_input_any_more(module: str, tmp_path: Path) -> None:
     """SPEC P411: as it is where a server was killed, on every system."""
     os.mkfifo(tmp_path / "never")
-    given = {"esker.server.first_build": ["loops"], "esker.server.upload": [str(tmp_path / "never"), str(tmp_path)]}[
-        module
-    ]
+    given = {
+        "esker.server.first_build": ["loops"],
+        "esker.server.upload": [str(tmp_path / "never"), str(tmp_path), "kept"],
+    }[module]
     env = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}  # compiling takes it longer than this test
     command, pipe = [sys.executable, "-m", module, *given], subprocess.PIPE
     with subprocess.Popen(command, cwd=ROOT, env=env, stdin=pipe, stdout=pipe, stderr=pipe) as child:

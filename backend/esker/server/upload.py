@@ -1,14 +1,16 @@
 """Reads an uploaded ``.esker`` file in a process of its own, with bounds on its memory and time (DESIGN 13).
 
-``python -m esker.server.upload FILE FOLDER`` is that process: the document as JSON on stdout, the rasters of its
-elevation layers as ``FOLDER/<digest>/``, or a sentence on stderr.
+``python -m esker.server.upload FILE FOLDER LOOPS`` is that process: the document as JSON on stdout, the rasters of its
+elevation layers as ``FOLDER/<digest>/``, or a sentence on stderr. ``LOOPS`` is a ``Loops``.
 """
 
 from __future__ import annotations
 
 import asyncio
 import sys
+from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
+from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
@@ -29,25 +31,60 @@ ADDRESS_BYTES: Final = 6 << 30
 CPU_SECONDS: Final = 10
 CPU_SECONDS_A_GIB: Final = 600
 """Further bytes for the grids in the file, by its size."""
+CPU_SECONDS_TO_COMPILE: Final = 300
+"""Further ones for a file with grids where nothing compiled is kept: half a minute of a fast core."""
 WALL_FACTOR: Final = 3.0
 AT_ONCE: Final = 2
-BAD_FILE: Final = 3
-"""Exit status for a file that is not good; anything else but 0 means that the reader itself was stopped."""
+BAD_FILE, NO_LOOPS = 3, 4
+"""Exit status for a file that is not good, and for one with grids before there are loops for them; anything else but 0
+means that the reader itself was stopped."""
 
 
-async def read_archive(path: Path, folder: Path, turn: AbstractAsyncContextManager[object]) -> Document:
+class Loops(StrEnum):
+    """Where the compiled loops are that a reader of grids runs."""
+
+    KEPT = "kept"
+    COMING = "coming"
+    """Being compiled by another process."""
+    MISSING = "missing"
+    """Nowhere, and no other process compiles them: the reader does."""
+
+
+async def read_archive(path: Path, folder: Path, turn: Callable[[], AbstractAsyncContextManager[object]]) -> Document:
     """The document in an ``.esker`` file; the rasters of its layers come to lie in ``folder`` under their digests.
 
-    Raises archive.ArchiveError with a sentence for a person. ``turn``: at most ``AT_ONCE`` of these run at a time.
+    Raises archive.ArchiveError with a sentence for a person. ``turn``: at most ``AT_ONCE`` of these run at a time. The
+    first file with grids on a machine is read again once their loops are compiled; most files have none, and wait for
+    nothing.
     """
-    warm.begin()  # most files have no grids, so that their reader does not wait for the loops
-    async with turn:
+    loops = Loops.COMING if warm.begin() is not None else _kept()
+    status, out, err = await _read(path, folder, turn, loops)
+    if status == NO_LOOPS:
+        await warm.loops()
+        status, out, err = await _read(path, folder, turn, _kept())
+    if status == BAD_FILE:
+        raise archive.ArchiveError(err.decode("utf-8", "replace").strip())
+    if status != 0:
+        raise archive.ArchiveError("Reading this file took too much memory or time.")
+    return await asyncio.to_thread(read_document, out)  # stroke by stroke: the event loop goes on meanwhile
+
+
+def _kept() -> Loops:
+    return Loops.KEPT if warm.record().exists() else Loops.MISSING
+
+
+async def _read(
+    path: Path, folder: Path, turn: Callable[[], AbstractAsyncContextManager[object]], loops: Loops
+) -> tuple[int | None, bytes, bytes]:
+    """Runs one reader; returns its exit status and all that it says. Raises ArchiveError where that takes too long."""
+    async with turn():
         process = await asyncio.create_subprocess_exec(
             sys.executable,
             "-m",
             "esker.server.upload",
             str(path),
             str(folder),
+            loops,
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE,
@@ -55,16 +92,12 @@ async def read_archive(path: Path, folder: Path, turn: AbstractAsyncContextManag
             **system.apart(),
         )
         try:
-            out, err = await asyncio.wait_for(_answer(process), WALL_FACTOR * cpu_seconds(path))
+            out, err = await asyncio.wait_for(_answer(process), WALL_FACTOR * cpu_seconds(path, loops))
         except TimeoutError:
             raise archive.ArchiveError("Reading this file took too long.") from None
         finally:
             await put_down(process)
-    if process.returncode == BAD_FILE:
-        raise archive.ArchiveError(err.decode("utf-8", "replace").strip())
-    if process.returncode != 0:
-        raise archive.ArchiveError("Reading this file took too much memory or time.")
-    return await asyncio.to_thread(read_document, out)  # stroke by stroke: the event loop goes on meanwhile
+    return process.returncode, out, err
 
 
 async def _answer(process: asyncio.subprocess.Process) -> tuple[bytes, bytes]:
@@ -78,35 +111,39 @@ async def _answer(process: asyncio.subprocess.Process) -> tuple[bytes, bytes]:
     return out, err
 
 
-def cpu_seconds(path: Path) -> int:
+def cpu_seconds(path: Path, loops: Loops = Loops.KEPT) -> int:
     """Seconds that the reader may take."""
-    return CPU_SECONDS + CPU_SECONDS_A_GIB * path.stat().st_size // (1 << 28)
+    compiling = CPU_SECONDS_TO_COMPILE if loops is Loops.MISSING else 0
+    return CPU_SECONDS + compiling + CPU_SECONDS_A_GIB * path.stat().st_size // (1 << 28)
 
 
-def bound(path: Path) -> None:
+def bound(path: Path, loops: Loops) -> None:
     """Bounds this process from now on, and puts it behind everything that rooms do."""
     system.step_back(limits.NICENESS)
     Bounds(
         memory_bytes=MEMORY_BYTES,
         address_bytes=ADDRESS_BYTES,
-        cpu_seconds=cpu_seconds(path),
+        cpu_seconds=cpu_seconds(path, loops),
         file_bytes=limits.FILE_BYTES,
         open_files=limits.OPEN_FILES,
         core_bytes=0,
     ).apply()
 
 
-def main(path: Path, folder: Path) -> int:
+def main(path: Path, folder: Path, loops: Loops) -> int:
     """Starts the process that reads."""
     system.speak_utf8()
     limits.keep_to(path, [folder])
     end_with_parent()
-    bound(path)
+    bound(path, loops)
     try:
         with path.open("rb") as file:
             document = archive.unpack(file, folder)
         check_document(document)
-        for digest in {layer.content for layer in (*document.layers, *document.deleted_layers)}:
+        digests = {layer.content for layer in (*document.layers, *document.deleted_layers)}
+        if digests and loops is Loops.COMING:
+            return NO_LOOPS
+        for digest in digests:
             _build(folder, digest)
     except (archive.ArchiveError, Refusal) as error:
         sys.stderr.write(str(error))
@@ -132,4 +169,4 @@ def _build(folder: Path, digest: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1]), Path(sys.argv[2])))
+    sys.exit(main(Path(sys.argv[1]), Path(sys.argv[2]), Loops(sys.argv[3])))

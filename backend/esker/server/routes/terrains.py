@@ -103,7 +103,7 @@ async def _taken_in(request: Request, grids: GridStore, uploads: Turns) -> c.Doc
     work = grids.work()
     try:
         await _receive(request, work / "upload.esker", MAX_IMPORT_BYTES, grids.space)
-        document = await read_archive(work / "upload.esker", work, uploads.turn(asker(request)))
+        document = await read_archive(work / "upload.esker", work, lambda: uploads.turn(asker(request)))
         for digest in {layer.content for layer in (*document.layers, *document.deleted_layers)}:
             await asyncio.to_thread(grids.keep, work / digest, digest)
         return document
