@@ -59,6 +59,13 @@ async def settle() -> None:
         await asyncio.sleep(0)
 
 
+async def all_heard(heard: list[Any], count: int) -> None:
+    """Waits until so many messages were heard: what takes long to read, on a busy machine say, is read in turns."""
+    async with asyncio.timeout(60):
+        while len(heard) < count:
+            await asyncio.sleep(0.001)
+
+
 def test_a_frame_made_once_arrives_as_a_text_and_not_after_the_end() -> None:
     async def run() -> None:
         wire = Wire()
@@ -136,10 +143,12 @@ def test_whole_texts_go_straight_to_the_listener(monkeypatch: pytest.MonkeyPatch
         for text in texts:
             wire.client.send_text(text.encode())
         wire.give()
+        await all_heard(heard, len(texts))
         assert heard == texts
         assert seen == [], "nothing was left to the library"
         wire.client.send_text(b"e" * 65_536)
         wire.give()
+        await all_heard(heard, len(texts) + 1)
         assert heard[len(texts) :] == ["e" * 65_536]
         assert len(b"".join(seen)) == 65_536 + 14
         wire.server.connection_lost(None)
@@ -178,6 +187,7 @@ def test_whatever_comes_in_whatever_pieces_is_heard_as_the_library_would_read_it
             size = rng.choice((1, 2, 5, 7, 50, 400, 3_000))
             wire.server.data_received(data[:size])
             data = data[size:]
+        await all_heard(heard, len(expected))
         assert heard == expected
         wire.server.connection_lost(None)
         await settle()
