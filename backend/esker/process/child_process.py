@@ -22,12 +22,22 @@ class Ended(Exception):
     """A child ended without saying its result; the message has its exit status and what it complained of."""
 
 
-async def start(module: str, **more: Any) -> asyncio.subprocess.Process:
-    """Starts ``python -m module`` with pipes to it and from it. ``more``: further arguments of
-    ``asyncio.create_subprocess_exec``. Raises OSError."""
+async def start(module: str, *arguments: str, **more: Any) -> asyncio.subprocess.Process:
+    """Starts ``python -m module`` with pipes to it and from it, out of reach of a terminal's Ctrl-C. ``more``: further
+    arguments of ``asyncio.create_subprocess_exec``. Raises OSError."""
     pipe = asyncio.subprocess.PIPE
+    options: dict[str, Any] = {} if hasattr(os, "setpgid") else system.apart()
     return await asyncio.create_subprocess_exec(
-        sys.executable, "-m", module, stdin=pipe, stdout=pipe, stderr=pipe, **system.apart(), **more
+        sys.executable,
+        "-m",
+        "esker.process.apart",
+        module,
+        *arguments,
+        stdin=pipe,
+        stdout=pipe,
+        stderr=pipe,
+        **options,
+        **more,
     )
 
 

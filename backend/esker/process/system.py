@@ -200,10 +200,11 @@ def on_stop(handler: Callable[..., Any]) -> None:
 def apart() -> dict[str, Any]:
     """Arguments of ``Popen`` for a child that a terminal's Ctrl-C does not reach: whoever started it ends it.
 
-    It would be interrupted wherever it is, in the middle of importing, say.
+    It would be interrupted wherever it is, in the middle of importing, say. It stays in the session of this process
+    (``process/apart.py`` says why).
     """
-    if hasattr(os, "setsid"):
-        return {"start_new_session": True}
+    if hasattr(os, "setpgid"):
+        return {"process_group": 0}
     return {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
 
 

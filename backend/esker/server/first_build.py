@@ -210,9 +210,9 @@ def _compiled(what: str, stopped: threading.Event, begins: Callable[[], None]) -
         return True
     begins()
     try:
-        told = prepare.bounded(["loops", what], stopped=stopped, times=LOOPS_TIMES)
-        if "failed" in told:
-            log.warning("loops of %s: %s; the server compiles what is missing", what, told["failed"])
+        result = prepare.bounded(["loops", what], stopped=stopped, times=LOOPS_TIMES)
+        if "failed" in result:
+            log.warning("loops of %s: %s; the server compiles what is missing", what, result["failed"])
         else:
             with suppress(OSError):
                 record.parent.mkdir(parents=True, exist_ok=True)

@@ -21,14 +21,15 @@ from esker.document import archive
 from esker.document.former import read_document
 from esker.document.ops import Refusal, check_document
 from esker.importing import limits, warm
-from esker.process import system
+from esker.process import child_process, system
 from esker.process.bounds import Bounds
 from esker.process.child_process import end_with_parent, put_down
 
 MEMORY_BYTES: Final = 1 << 30
 """Bytes that the process may take of its own; mapped files do not count."""
 ADDRESS_BYTES: Final = 6 << 30
-CPU_SECONDS: Final = 10
+CPU_SECONDS: Final = 20
+"""The largest document takes 4 of a fast core."""
 CPU_SECONDS_A_GIB: Final = 600
 """Further bytes for the grids in the file, by its size."""
 CPU_SECONDS_TO_COMPILE: Final = 300
@@ -78,19 +79,8 @@ async def _read(
 ) -> tuple[int | None, bytes, bytes]:
     """Runs one reader; returns its exit status and all that it says. Raises ArchiveError where that takes too long."""
     async with turn():
-        process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-m",
-            "esker.server.upload",
-            str(path),
-            str(folder),
-            loops,
-            stdin=asyncio.subprocess.PIPE,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-            env=limits.environment(),
-            **system.apart(),
-        )
+        reader = "esker.server.upload"
+        process = await child_process.start(reader, str(path), str(folder), loops, env=limits.environment())
         try:
             out, err = await asyncio.wait_for(_answer(process), WALL_FACTOR * cpu_seconds(path, loops))
         except TimeoutError:
