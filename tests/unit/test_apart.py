@@ -38,6 +38,23 @@ def test_a_child_has_a_group_of_its_own_in_the_session_of_its_parent(
     assert json.loads(run(answer())) == WANTED
 
 
+@pytest.mark.parametrize("run", [asyncio.run, uvloop.run])
+def test_a_child_that_has_ended_before_it_gets_its_task_has_ended_and_nothing_else(
+    run: Callable[[Coroutine[Any, Any, None]], None], tmp_path: Path
+) -> None:
+    """uvloop says of its pipe what asyncio does not, and the log had a traceback of an export."""
+    (tmp_path / "ends.py").write_text("raise SystemExit('enough')")
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+
+    async def ask() -> None:
+        process = await child_process.start("ends", env=os.environ | {"PYTHONPATH": path})
+        await process.wait()
+        with pytest.raises(child_process.Ended, match="1: enough"):
+            await anext(child_process.lines(process, "task"))
+
+    run(ask())
+
+
 def test_so_has_one_that_a_thread_starts() -> None:
     told = subprocess.run([sys.executable, "-c", SAYS, "a", "b c"], capture_output=True, check=True, **system.apart())
     assert json.loads(told.stdout) == WANTED

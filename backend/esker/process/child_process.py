@@ -52,7 +52,7 @@ async def lines(process: asyncio.subprocess.Process, task: str) -> AsyncGenerato
     assert process.stderr is not None
     complaints = asyncio.create_task(_tail(process.stderr))
     try:
-        with contextlib.suppress(ConnectionError):
+        with contextlib.suppress(ConnectionError, RuntimeError):  # uvloop raises the latter for a pipe that is closed
             process.stdin.write(task.encode() + b"\n")
             await process.stdin.drain()
         while text := await process.stdout.readline():
