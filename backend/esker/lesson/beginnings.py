@@ -36,7 +36,7 @@ class Beginning:
         return None if self._settings != born.settings else _head(born) + self._tail
 
     def keep(self, born: c.Document, text: str) -> None:
-        """Keeps the JSON text of a copy for those that follow. Raises ValueError where it begins with no id."""
+        """Keeps the JSON text of a copy for those that follow. Raises ValueError for a text of another id."""
         head = _head(born)
         if not text.startswith(head):
             raise ValueError("a document begins with its id")
