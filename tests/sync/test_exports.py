@@ -17,6 +17,7 @@ import pytest
 
 from esker import Stroke, Terrain
 from esker import contract as c
+from esker.api import export_child
 from esker.api.export_child import Failure, Out, work
 from esker.exporting import run, wire
 from esker.exporting.run import ExportFailed
@@ -329,7 +330,9 @@ def test_a_cancelled_process_is_gone(tmp_path: Path) -> None:
         await begun.wait()
         mine = psutil.Process().children()
         assert any("esker.api.export_child" in process.cmdline() for process in mine)
-        assert all(process.nice() >= 15 for process in mine if "esker.api.export_child" in process.cmdline())
+        assert all(
+            process.nice() >= export_child.NICENESS for process in mine if "esker.api.export_child" in process.cmdline()
+        )
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
             await task

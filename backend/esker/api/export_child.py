@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("esker.exporting")
 
-NICENESS: Final = 15
+NICENESS: Final = 5
+"""As far as readers of files step back: a third of a core that somebody busy wants too. At 15 it is a thirtieth."""
 FILE_BYTES: Final = 4 << 30
 CPU_SECONDS: Final = 4 * 3600
 """Processor time of all threads together; the server looks at the clock (``run.WALL_SECONDS``)."""
