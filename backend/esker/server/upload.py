@@ -101,7 +101,7 @@ async def _answer(process: asyncio.subprocess.Process) -> tuple[bytes, bytes]:
     return out, err
 
 
-def cpu_seconds(path: Path, loops: Loops = Loops.KEPT) -> int:
+def cpu_seconds(path: Path, loops: Loops) -> int:
     """Seconds that the reader may take."""
     compiling = CPU_SECONDS_TO_COMPILE if loops is Loops.MISSING else 0
     return CPU_SECONDS + compiling + CPU_SECONDS_A_GIB * path.stat().st_size // (1 << 28)
