@@ -99,9 +99,9 @@ generate: $(STAMPS)/python
 	$(BIN)/python docs/rooms.py
 
 lock: $(STAMPS)/dev ## renew the lock files
-	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url pyproject.toml build.in -o requirements.lock
-	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url --extra cluster pyproject.toml build.in -c requirements.lock -o requirements-cluster.lock
-	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-emit-index-url --extra cluster --extra dev --extra bench pyproject.toml build.in -c requirements.lock -o requirements-dev.lock
+	$(BIN)/uv pip compile --quiet --universal --fork-strategy fewest --python-version 3.11 --generate-hashes --no-header --no-emit-index-url pyproject.toml build.in -o requirements.lock
+	$(BIN)/uv pip compile --quiet --universal --fork-strategy fewest --python-version 3.11 --generate-hashes --no-header --no-emit-index-url --extra cluster pyproject.toml build.in -c requirements.lock -o requirements-cluster.lock
+	$(BIN)/uv pip compile --quiet --universal --fork-strategy fewest --python-version 3.11 --generate-hashes --no-header --no-emit-index-url --extra cluster --extra dev --extra bench pyproject.toml build.in -c requirements.lock -o requirements-dev.lock
 	cd frontend && rm -f package-lock.json && npm install --package-lock-only
 	.ci/audit --renew
 

@@ -165,6 +165,22 @@ def test_a_full_disk_is_reported_and_survived(journal: Journal) -> None:
     journal.close()
 
 
+def test_a_database_that_cannot_be_opened_is_closed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC J566."""
+    opened = []
+
+    def fails(db: sqlite3.Connection, *_: object) -> None:
+        opened.append(db)
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("esker.store.upkeep.migrations.migrate", fails)
+    with pytest.raises(ZeroDivisionError):
+        Journal(tmp_path)
+    (db,) = opened
+    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+        db.execute("SELECT 1")
+
+
 @pytest.mark.parametrize("others", [0, 1])
 def test_a_failure_that_others_of_the_batch_survive_is_told(journal: Journal, others: int) -> None:
     """SPEC J264. SQLite may end the statement alone that finds the disk full."""
@@ -172,8 +188,14 @@ def test_a_failure_that_others_of_the_batch_survive_is_told(journal: Journal, ot
     def fails(db: Connection) -> None:
         db.execute("INSERT INTO nowhere VALUES (1)")
 
-    gate = threading.Event()
-    held = journal.submit(lambda _: gate.wait(60))
+    at_work, gate = threading.Event(), threading.Event()
+
+    def holds(_: Connection) -> bool:
+        at_work.set()
+        return gate.wait(60)
+
+    held = journal.submit(holds)
+    assert at_work.wait(60), "the writer took it alone: what follows is of one batch"
     failed = journal.submit(fails)
     beside = [journal.append("t", _rows(1, 1)) for _ in range(others)]
     gate.set()
@@ -288,10 +310,9 @@ def test_backups_are_complete_while_the_journal_is_written(journal: Journal, tmp
         before = appended[0]
         journal._now = lambda i=i: 1000.0 + i  # type: ignore[misc]
         path = copied(journal)
-        with sqlite3.connect(path) as db:
+        with closing(sqlite3.connect(path)) as db:
             assert db.execute("PRAGMA integrity_check").fetchone()[0] == "ok"
             count = db.execute("SELECT count(*), max(clock) FROM ops").fetchone()
-        db.close()
         assert count[0] == (count[1] or 0) >= before
         copies.append(path)
     stop.set()

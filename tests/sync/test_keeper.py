@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -135,9 +136,8 @@ def test_list_and_link_beside_a_running_server(tmp_path: Path, capsys: pytest.Ca
         assert _role(server, terrain, made.split("#")[1]) == "view", "it works at once"
     assert main.main(["link", "nowhere", "--data", str(tmp_path)]) == 1
     assert "nowhere" in capsys.readouterr().err
-    with sqlite3.connect(tmp_path / "esker.db") as db:
+    with closing(sqlite3.connect(tmp_path / "esker.db")) as db:
         db.execute("PRAGMA user_version=1")
-    db.close()
     assert main.main(["list", "--data", str(tmp_path)]) == 1
     assert "start the server once" in capsys.readouterr().err
     assert main.main(["list", "--data", str(tmp_path / "none")]) == 1

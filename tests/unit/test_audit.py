@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import importlib.util
 import json
+import re
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,14 @@ def test_every_locked_package_is_in_the_list() -> None:
     assert {pin.of for pin in pins} == {"python", "page", "tools", "build"}
     assert len(pins) > 150
     assert max(pins.values()) - min(pins.values()) <= datetime.timedelta(audit.DAYS), "some were left behind"
+
+
+def test_pythons_that_are_tested_have_the_same_packages() -> None:
+    """SPEC H568: a newer Python had another NumPy, with which nothing had ever been tested and types were wrong."""
+    for lock in ROOT.glob("requirements*.lock"):
+        found = re.findall(r"^([a-z0-9-]+)==.*python\S*_version \S+ '(3\.\d+)'", lock.read_text(encoding="utf-8"), re.M)
+        assert found, "the newest Python has other packages"
+        assert [each for each in found if each[1] != "3.15"] == [], lock.name
 
 
 def test_the_list_names_what_users_get_and_what_makes_it(project: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 from esker.store.engine.ports import BadDatabase, Connection, Database, Reads
-from esker.store.engine.sqlite import connect
+from esker.store.engine.sqlite import closed_on_failure, connect
 from esker.store.upkeep.inspection import DATABASE_NAME
 from esker.store.upkeep.migrations import FORMAT
 from esker.store.upkeep.place import NO_DRIVER
@@ -103,11 +103,11 @@ class _File:
         if not path.is_file():
             raise FileNotFoundError(f"There is no {DATABASE_NAME} in {data}: no server has kept anything there.")
         self._db = connect(path)
-        found = int(self._db.execute("PRAGMA user_version").fetchone()[0])
-        if found != FORMAT:
-            self._db.close()
-            older = "an older Esker: start the server once" if found < FORMAT else "a newer Esker"
-            raise ValueError(f"{path} is of {older} (format {found}, not {FORMAT}).")
+        with closed_on_failure(self._db):
+            found = int(self._db.execute("PRAGMA user_version").fetchone()[0])
+            if found != FORMAT:
+                older = "an older Esker: start the server once" if found < FORMAT else "a newer Esker"
+                raise ValueError(f"{path} is of {older} (format {found}, not {FORMAT}).")
 
     def close(self) -> None:
         self._db.close()

@@ -41,9 +41,10 @@ class Sqlite:
         check(self.path, directory)
         new = not self.path.exists()
         self.writer_db = connect(self.path)
-        migrations.migrate(self.writer_db, lambda old: keep_copy(self.path, directory, f"format-{old}", now))
-        if new:
-            migrations.state(self.writer_db, "swept_from", str(now + migrations.SWEEP_AFTER))
+        with closed_on_failure(self.writer_db):
+            migrations.migrate(self.writer_db, lambda old: keep_copy(self.path, directory, f"format-{old}", now))
+            if new:
+                migrations.state(self.writer_db, "swept_from", str(now + migrations.SWEEP_AFTER))
         lengthen(directory / f"{DATABASE_NAME}-wal")
         self._readers = threading.local()
         self._open_readers: list[sqlite3.Connection] = []
@@ -157,11 +158,22 @@ class Sqlite:
 def connect(path: Path) -> sqlite3.Connection:
     """A connection with the journal's pragmas, in autocommit mode (transactions are explicit)."""
     db = sqlite3.connect(path, isolation_level=None, check_same_thread=False, timeout=10)
-    db.execute("PRAGMA journal_mode=WAL")
-    db.execute("PRAGMA synchronous=FULL")
-    db.execute("PRAGMA foreign_keys=ON")
-    db.execute(f"PRAGMA journal_size_limit={LOG_BYTES}")
+    with closed_on_failure(db):
+        db.execute("PRAGMA journal_mode=WAL")
+        db.execute("PRAGMA synchronous=FULL")
+        db.execute("PRAGMA foreign_keys=ON")
+        db.execute(f"PRAGMA journal_size_limit={LOG_BYTES}")
     return db
+
+
+@contextmanager
+def closed_on_failure(db: sqlite3.Connection) -> Iterator[None]:
+    """Closes the connection when what is done with it fails: whoever was to own it never gets it."""
+    try:
+        yield
+    except BaseException:
+        db.close()
+        raise
 
 
 def lengthen(log: Path) -> None:
