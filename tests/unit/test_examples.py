@@ -32,7 +32,7 @@ def written() -> list[str]:
 
 def failures(name: str, given: Mapping[str, object] | None = None) -> str:
     """What the examples of a module gave that they do not print; ``given`` are names that they use."""
-    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    runner = doctest.DocTestRunner(verbose=False, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     report: list[str] = []
     for each in examples(name):
         each.globs.update(given or {})
