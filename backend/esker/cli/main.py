@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from esker import contract as c
 from esker import resources
-from esker.process import system
+from esker.process import caches, system
 from esker.version import VERSION
 
 if TYPE_CHECKING:
@@ -117,6 +117,7 @@ def _serve(parsed: argparse.Namespace) -> int:
     from esker.store.upkeep.inspection import CorruptDatabase
 
     os.umask(PRIVATE_UMASK)
+    caches.keep_in(settings.data)
     stopping = starting.Stopping()
     try:
         system.on_stop(stopping)

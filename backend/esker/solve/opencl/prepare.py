@@ -26,7 +26,7 @@ from typing import Any, Final
 
 import psutil
 
-from esker.process import system
+from esker.process import caches, system
 from esker.resources import SHADERS
 from esker.solve.opencl import program_text
 from esker.solve.opencl.pocl import cpu, home
@@ -86,6 +86,7 @@ _lock = threading.RLock()
 
 def settle() -> None:
     """Settles PoCL's environment before anything lists the devices of this process."""
+    caches.spare_pyopencl()
     with _lock:
         if _state.settled or home.site() is None:
             return

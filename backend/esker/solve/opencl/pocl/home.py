@@ -20,6 +20,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from esker.process import caches
 from esker.solve.opencl.pocl import cpu, link
 
 LIMIT: Final = "ESKER_CPU_LEVEL"
@@ -49,23 +50,11 @@ def site() -> Path | None:
 def root() -> Path:
     """The folder for what is compiled. Where none can be written: one that goes when the process ends."""
     named = os.environ.get(ROOT) or os.environ.get(_FOLDER)
-    folder = Path(named) if named else _own()
-    if os.environ.get(_CACHE) == "0" or not _writable(folder):
+    folder = Path(named) if named else caches.users() / "esker"
+    if os.environ.get(_CACHE) == "0" or not caches.writable(folder):
         folder = _passing()
     os.environ[ROOT] = str(folder)
     return folder
-
-
-def _own() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / "esker"
-
-
-def _writable(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    return os.access(folder, os.W_OK)
 
 
 @lru_cache(maxsize=1)
