@@ -14,7 +14,7 @@ import pytest
 from esker import contract as c
 from esker.importing import limits, warm, wire
 from esker.patchwork import kept_loops
-from esker.process import confinement
+from esker.process import caches, confinement
 from tests.importing.conftest import PLACE, SIZE_M
 
 FILES = Path(__file__).parent / "files"
@@ -96,9 +96,9 @@ def test_a_folder_of_one_s_own_finds_what_was_kept_and_changes_none_of_it(
     (kept / "room").mkdir(parents=True)
     (kept / "room" / "loop.nbi").write_bytes(b"index")
     (kept / "room" / "notes.txt").write_bytes(b"no loop")
-    monkeypatch.setenv(kept_loops.VARIABLE, str(kept))
+    monkeypatch.setenv(caches.LOOPS, str(kept))
     kept_loops.use_own(own)
-    assert os.environ[kept_loops.VARIABLE] == str(own)
+    assert os.environ[caches.LOOPS] == str(own)
     assert (own / "room" / "loop.nbi").read_bytes() == b"index"
     assert not (own / "room" / "notes.txt").exists()
     fresh = own / "room" / "fresh"
@@ -109,6 +109,6 @@ def test_a_folder_of_one_s_own_finds_what_was_kept_and_changes_none_of_it(
 
 def test_where_nothing_was_kept_a_reader_has_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC A446."""
-    monkeypatch.setenv(kept_loops.VARIABLE, str(tmp_path / "nothing"))
+    monkeypatch.setenv(caches.LOOPS, str(tmp_path / "nothing"))
     kept_loops.use_own(tmp_path / "own")
     assert list((tmp_path / "own").iterdir()) == []

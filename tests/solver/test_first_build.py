@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -58,6 +59,18 @@ def test_a_child_past_its_bounds_is_ended(
     monkeypatch.setattr(prepare, *bound)
     assert why in prepare.bounded([])["failed"]
     assert children() == before
+
+
+@pytest.mark.parametrize("broken", ["waits"], indirect=True)
+def test_what_a_child_starts_while_it_is_ended_ends_too(broken: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S141: it held the pipes of the child open, and who had ended the child waited for them."""
+    monkeypatch.setattr(prepare, "PATIENCE", 2.0)
+    monkeypatch.setattr(psutil.Process, "children", lambda *_, **__: [])  # as one looks just before it starts one
+    done: list[dict[str, Any]] = []
+    thread = threading.Thread(target=lambda: done.append(prepare.bounded([])), daemon=True)
+    thread.start()
+    thread.join(60)
+    assert done, "it waits for ten minutes"
 
 
 @pytest.mark.parametrize("broken", ["waits"], indirect=True)

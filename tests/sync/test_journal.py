@@ -9,6 +9,7 @@ import time
 from concurrent.futures import Future, wait
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,7 +17,7 @@ from esker import contract as c
 from esker.document.ops import StrokeSet
 from esker.document.wire import op_json
 from esker.store.engine.ports import Connection, UsedTwice
-from esker.store.engine.sqlite import LOG_BYTES
+from esker.store.engine.sqlite import LOG_BYTES, connect
 from esker.store.journal import DamagedTerrain, Journal, Row, Unwritable
 from esker.store.upkeep import backup
 from esker.store.upkeep.backup import last_backup
@@ -167,18 +168,27 @@ def test_a_full_disk_is_reported_and_survived(journal: Journal) -> None:
 
 def test_a_database_that_cannot_be_opened_is_closed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC J566."""
-    opened = []
+    opened: list[sqlite3.Connection] = []
+    opens = sqlite3.connect
 
-    def fails(db: sqlite3.Connection, *_: object) -> None:
-        opened.append(db)
+    def noted(*args: Any, **more: Any) -> sqlite3.Connection:
+        opened.append(opens(*args, **more))
+        return opened[-1]
+
+    def fails(*_: object) -> None:
         raise ZeroDivisionError
 
+    monkeypatch.setattr("esker.store.engine.sqlite.sqlite3.connect", noted)
+    (tmp_path / "none.db").write_bytes(b"no database" * 100)
+    with pytest.raises(sqlite3.DatabaseError):
+        connect(tmp_path / "none.db")
     monkeypatch.setattr("esker.store.upkeep.migrations.migrate", fails)
     with pytest.raises(ZeroDivisionError):
         Journal(tmp_path)
-    (db,) = opened
-    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
-        db.execute("SELECT 1")
+    assert len(opened) == 2
+    for db in opened:
+        with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+            db.execute("SELECT 1")
 
 
 @pytest.mark.parametrize("others", [0, 1])

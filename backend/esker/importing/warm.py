@@ -22,7 +22,7 @@ import numpy as np
 
 from esker.importing import limits
 from esker.patchwork import kept_loops
-from esker.process import child_process
+from esker.process import caches, child_process
 
 log = logging.getLogger("esker.importing")
 
@@ -102,7 +102,7 @@ def main() -> int:
     """The process that compiles."""
     child_process.end_with_parent()
     limits.apply("convert")
-    os.environ.setdefault(kept_loops.VARIABLE, str(kept_loops.beside()))
+    os.environ.setdefault(caches.LOOPS, str(kept_loops.beside()))
     with tempfile.TemporaryDirectory(prefix="esker-warm-") as folder:
         work(Path(folder))
     record().touch()

@@ -18,7 +18,7 @@ import numba
 
 from esker import compiled
 from esker.patchwork import kept_loops
-from esker.process import system
+from esker.process import caches, system
 
 __all__ = ["bands", "kernel", "processors", "spread"]
 
@@ -39,7 +39,7 @@ def _keep_by_content() -> str | None:
     for other in kept.parent.glob("compiled-*"):
         if other != kept:
             shutil.rmtree(other, ignore_errors=True)
-    return None if kept_loops.VARIABLE in os.environ else str(kept)
+    return None if caches.LOOPS in os.environ else str(kept)
 
 
 _KEPT: Final = _keep_by_content()

@@ -14,8 +14,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-VARIABLE: Final = "NUMBA_CACHE_DIR"
-"""The environment variable that names numba's folder; it goes before the folder of this package."""
+from esker.process.caches import LOOPS
+
 _PACKAGE: Final = Path(__file__).resolve().parents[1]
 
 
@@ -33,7 +33,7 @@ def beside() -> Path:
 
 def folder() -> Path:
     """Returns where processes that may write keep loops."""
-    named = os.environ.get(VARIABLE)
+    named = os.environ.get(LOOPS)
     return Path(named) if named else beside()
 
 
@@ -47,4 +47,4 @@ def use_own(own: Path) -> None:
             link.symlink_to(path)
     with suppress(OSError):
         own.mkdir(parents=True, exist_ok=True)
-    os.environ[VARIABLE] = str(own)
+    os.environ[LOOPS] = str(own)

@@ -15,6 +15,7 @@ log = logging.getLogger(__name__)
 
 CACHES: Final = "XDG_CACHE_HOME"
 LOOPS: Final = "NUMBA_CACHE_DIR"
+"""Names numba's folder, which goes before the folders beside the modules."""
 NO_PYOPENCL: Final = "PYOPENCL_NO_CACHE"
 PACKAGE: Final = Path(__file__).resolve().parents[1]
 

@@ -208,6 +208,18 @@ def apart() -> dict[str, Any]:
     return {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
 
 
+def end_apart(child: subprocess.Popen[bytes]) -> None:
+    """Ends a child that was started ``apart`` and has not been waited for, with all that is in its group.
+
+    What it starts in this very moment is in its group too; a list of its children would lack it.
+    """
+    if hasattr(os, "killpg"):
+        with suppress(ProcessLookupError):
+            os.killpg(child.pid, signal.SIGKILL)
+    else:
+        child.kill()
+
+
 def was_killed(status: int | None) -> bool:
     """Returns whether a child's exit status says that the system ended it. Windows says nothing of the kind."""
     return hasattr(signal, "SIGKILL") and status == -signal.SIGKILL

@@ -331,7 +331,7 @@ def _end(child: subprocess.Popen[bytes]) -> None:
     family = []
     with contextlib.suppress(psutil.Error):
         family = psutil.Process(child.pid).children(recursive=True)
-    child.kill()
+    system.end_apart(child)
     for one in family:
         with contextlib.suppress(psutil.Error):
             one.kill()
