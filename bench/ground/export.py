@@ -1,6 +1,7 @@
 """Exports: what each kind of file costs, and whether drawing waits for one (docs/exporting.md).
 
 ``files``: processor time of all threads, the solve included, and bytes of each kind of file of a starting terrain.
+``memory``: the most that the process of an export holds, of the largest files of drawn and of real ground.
 ``drawing``: the latencies of ``esker bench stream`` on a terrain of a server, alone and while the same server makes the
 largest export of another terrain, in turns; each is the median of the rounds.
 """
@@ -16,21 +17,40 @@ import threading
 import time
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
+import psutil
+
 from bench.room import _serving, stream
 from esker import templates
 from esker.api.terrain import Terrain
+from esker.contract import ExportRequest
+from esker.exporting import wire
 from esker.exporting.formats import FORMATS, export
 from esker.exporting.ground import Extent
+from esker.patchwork.raster import rasters
 from esker.solve.solver import Solver
 from esker.version import VERSION
 
 SCENE: Final = "alpine-ridge"
 WANTED: Final = {"format": "png16", "samples": 4097, "detail": True}
+LARGEST: Final[tuple[tuple[str, dict[str, Any]], ...]] = tuple(
+    (scene, {"format": kind, "samples": samples, "detail": detail})
+    for scene in (SCENE, "rainier")
+    for kind, samples, detail in (
+        ("png16", 4097, False),
+        ("png16", 4097, True),
+        ("geotiff", 4033, True),
+        ("masks", 4097, True),
+        ("glb", 1025, True),
+        ("map_pdf", 2049, True),
+        ("stl", 1025, True),
+    )
+)
+LOOK_SECONDS: Final = 0.02
 SHOWN: Final = ("first_coarse_tile_ms", "level_4_preview_ms")
 
 
@@ -54,6 +74,52 @@ def measure_files(solver: Solver, sizes: list[int]) -> dict[str, Any]:
                         "bytes_per_sample": round(size / samples**2, 2),
                     }
     return out
+
+
+def measure_memory(wanted: tuple[tuple[str, dict[str, Any]], ...] = LARGEST) -> dict[str, Any]:
+    """Returns the most memory, MiB, and the seconds of the process that makes each file, as a server starts it."""
+    out: dict[str, Any] = {}
+    for scene, asked in wanted:
+        with tempfile.TemporaryDirectory(prefix="esker-bench-") as folder:
+            grids, template = Path(folder) / "grids", templates.load(scene)
+            for content, raster in template.rasters().items():
+                rasters.write(grids / content, raster)
+            (Path(folder) / "made").mkdir()
+            task = wire.Task(
+                document=template.document,
+                wanted=ExportRequest.model_validate(asked),
+                grids=str(grids),
+                folder=str(Path(folder) / "made"),
+                name="a",
+            )
+            took, most, last = asyncio.run(_watched(wire.task_line(task)))
+        if not isinstance(last, wire.Made):
+            raise RuntimeError(f"{scene}, {asked}: {last}")
+        detail = "_detail" if asked["detail"] else ""
+        name = f"{scene}_{asked['format']}_{asked['samples']}{detail}"
+        out[name] = {"memory_mb": most >> 20, "s": round(took, 1)}
+    return out
+
+
+async def _watched(line: str) -> tuple[float, int, Any]:
+    """Runs the process of one export: seconds, most bytes resident, and what it said last."""
+    began, most = time.monotonic(), 0
+    child = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "esker.api.export_child",
+        stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    assert child.stdin is not None
+    assert child.stdout is not None
+    child.stdin.write(line.encode() + b"\n")
+    said = asyncio.create_task(child.stdout.read())
+    watched = psutil.Process(child.pid)
+    while not said.done():
+        with suppress(psutil.Error):
+            most = max(most, watched.memory_info().rss)
+        await asyncio.sleep(LOOK_SECONDS)
+    await child.wait()
+    lines = (await said).splitlines()
+    return time.monotonic() - began, most, wire.LINE.validate_json(lines[-1]) if lines else None
 
 
 @contextmanager
@@ -124,12 +190,14 @@ def main(argv: list[str]) -> int:
         "scene": SCENE,
         "files": measure_files(solver, arguments.samples or [1025, 2049, 4097]),
     }
+    if not arguments.samples:
+        result["memory"] = measure_memory()
     if arguments.rounds:
         result["drawing"] = measure_drawing(arguments.rounds, arguments.appends)
     if arguments.json:
         sys.stdout.write(json.dumps(result, indent=1) + "\n")
     else:
-        for part in ("files", "drawing"):
+        for part in ("files", "memory", "drawing"):
             for key, value in result.get(part, {}).items():
                 sys.stdout.write(f"{part}.{key}: {value}\n")
     return 0

@@ -168,13 +168,14 @@ async def pupil(at: Target) -> int:
 
 
 async def exports(at: Target) -> int:
-    """Maps and solids, with every number at an end of its range."""
+    """Maps and solids, with every number at an end of its range, and the largest of other files."""
     asked: tuple[dict[str, Any], ...] = (
         {"format": "map_pdf", "samples": 2049, "paper": {"size": "a3", "interval_m": 1e-300}},
         {"format": "map_svg", "samples": 2049, "paper": {"size": "a3", "scale": 1}},
         {"format": "map_svg", "samples": 1009, "paper": {"size": "a4", "scale": 50_000_000, "interval_m": 0.01}},
         {"format": "stl", "samples": 1025, "model": {"width_mm": 2000, "base_mm": 0.2, "exaggeration": 20}},
         {"format": "masks", "samples": 4097, "weights": True},
+        {"format": "png16", "samples": 4097, "detail": False},
     )
 
     async def ask() -> None:

@@ -126,7 +126,7 @@ def _made(task: wire.Task, device: str | None, grids: dict[str, Raster], out: Ou
     form = FORMATS[wanted.format]
     extent = Extent.of(None, wanted.samples)
     out.step("solving", 0.0)
-    solver = _solver(device, extent.level, task.threads, out)
+    solver = _solver(device, task.global_level, task.threads, out)
     terrain = Terrain.from_document(task.document, grids, solver, trusted=True)
     levels = {"global_level": task.global_level, "refined_level": max(task.refined_level, task.global_level)}
     path = folder / (task.name + form.suffixes[0])

@@ -297,10 +297,11 @@ class Terrain(TerrainLayers, TerrainWater):
         ``.stl`` (a solid for printers).
 
         ``level``, or ``samples`` a side (one of EXPORT_LEVELS); ``window``: only the samples of ``level`` in this
-        rectangle (x0, y0, x1, y1) of world metres. ``detail`` and the levels: as in ``heights``; masks and colours
-        always come from the detail. ``weights``: masks that sum to one, with one for bare ground. ``paper``: paper,
-        scale and interval of a contour map; ``model``: width, base and exaggeration of a solid. ``progress`` is told
-        the share that is done. Raises ValueError for what cannot be written so, OSError.
+        rectangle (x0, y0, x1, y1) of world metres. ``detail``: as in ``heights``; without it levels above
+        ``global_level`` are refined, as in ``window``. Masks and colours always come from the detail. ``weights``:
+        masks that sum to one, with one for bare ground. ``paper``: paper, scale and interval of a contour map;
+        ``model``: width, base and exaggeration of a solid. ``progress`` is told the share that is done. Raises
+        ValueError for what cannot be written so, OSError.
         """
         from esker.exporting import formats  # not with this module: it brings pyproj
         from esker.exporting.ground import Extent

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker import contract, grid
-from esker.exporting.ground import Ground, HeightSource, eight_bits
+from esker.exporting.ground import Ground, HeightSource, Mask, bands, eight_bits
 from esker.flow.rivers import water_of
 from esker.flow.water import Water
 
@@ -39,7 +39,7 @@ def with_flow(terrain: HeightSource, ground: Ground, **levels: int) -> Ground:
         for corner, n in ((ground.y_m, rows), (ground.x_m, columns))
     )
     masks = {
-        name: eight_bits(_between(share, y, x)) for name, share in ((FLOW, flow(water)), (DEPOSITS, deposits(water)))
+        name: _eight_bits_between(share, y, x) for name, share in ((FLOW, flow(water)), (DEPOSITS, deposits(water)))
     }
     return replace(ground, masks={**ground.masks, **masks})
 
@@ -78,6 +78,14 @@ def _spread(values: NDArray[np.float64]) -> NDArray[np.float64]:
     rows = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
     blurred: NDArray[np.float64] = 0.25 * rows[:, :-2] + 0.5 * rows[:, 1:-1] + 0.25 * rows[:, 2:]
     return blurred
+
+
+def _eight_bits_between(values: Grid, y: NDArray[np.float64], x: NDArray[np.float64]) -> Mask:
+    """``_between`` in steps of 1/255, in bands of rows."""
+    steps = np.empty((len(y), len(x)), dtype=np.uint8)
+    for start, stop in bands(0, *steps.shape):
+        steps[start:stop] = eight_bits(_between(values, y[start:stop], x))
+    return steps
 
 
 def _between(values: Grid, y: NDArray[np.float64], x: NDArray[np.float64]) -> Grid:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, Protocol
 
@@ -152,45 +152,62 @@ def take(
     progress: Progress | None = None,
     **levels: int,
 ) -> Ground:
-    """The ground of a terrain: ``Terrain.heights`` or ``Terrain.window``, interpolated where ``extent`` has a few
-    samples less than its level. ``masks``: with covers, which come with the detail; ``solved``: beside them the heights
-    without it; ``levels``: ``global_level`` and
-    ``refined_level`` of the detail. Raises ValueError, and what solves raise."""
+    """The ground of a terrain: ``Terrain.heights`` of a level that is solved as a whole, else ``Terrain.window``,
+    interpolated where ``extent`` has a few samples less than its level. ``masks``: with covers, which come with the
+    detail; ``solved``: beside them the heights without it; ``levels``: ``global_level`` and, for the detail,
+    ``refined_level``. Raises ValueError, and what solves raise."""
     if not detail and not masks:
-        ground = _plain(terrain, extent, progress)
+        ground = _plain(terrain, extent, progress, levels)
     else:
         ground = _detailed(terrain, extent, progress, levels, masks)
         if solved or not detail:
-            plain = _plain(terrain, extent, None).heights
+            plain = _plain(terrain, extent, None, levels).heights
             ground = replace(ground, solved=plain if solved else None, heights=ground.heights if detail else plain)
     if extent.window is None and extent.samples != grid.samples(extent.level):
         ground = _fewer(ground, extent.samples)
     return _with_water(terrain, ground, levels.get("global_level", contract.DEFAULT_LEVEL)) if masks else ground
 
 
-def _plain(terrain: HeightSource, extent: Extent, progress: Progress | None) -> Ground:
-    settings, level = terrain.settings, extent.level
-    if extent.window is None:
-        return Ground(terrain.heights(level), 0.0, 0.0, grid.spacing(level, settings.size_m), settings)
-    found = terrain.window(level, *extent.window, progress=progress)
-    return Ground(found.heights, found.x_m, found.y_m, found.spacing_m, settings)
+def _plain(terrain: HeightSource, extent: Extent, progress: Progress | None, levels: Mapping[str, int]) -> Ground:
+    """Without detail. What lies above the levels that are solved as a whole is refined, as the page shows it: to solve
+    the finest level as a whole takes gigabytes, most of them for what has been settled already."""
+    if extent.window is None and extent.level <= levels.get("global_level", contract.DEFAULT_LEVEL):
+        s = grid.spacing(extent.level, terrain.settings.size_m)
+        return Ground(terrain.heights(extent.level), 0.0, 0.0, s, terrain.settings)
+    known = {"global_level": levels["global_level"]} if "global_level" in levels else {}
+    return _in_bands(terrain, extent, progress, False, known, ())
 
 
 def _detailed(
     terrain: HeightSource, extent: Extent, progress: Progress | None, levels: Mapping[str, int], masks: bool
 ) -> Ground:
-    """In bands of rows: seven attributes of a large level take more memory than all else together."""
+    """With detail: seven attributes of a large level take more memory than all else together."""
+    return _in_bands(terrain, extent, progress, True, levels, _covers(terrain.settings) if masks else ())
+
+
+def _in_bands(
+    terrain: HeightSource,
+    extent: Extent,
+    progress: Progress | None,
+    detail: bool,
+    levels: Mapping[str, int],
+    covers: tuple[str, ...],
+) -> Ground:
+    """In bands of rows, which begin where tiles do: of each only what is kept stays in memory."""
     settings, level = terrain.settings, extent.level
     size = settings.size_m
     r0, r1, c0, c1 = grid.Rect(*(extent.window or (0.0, 0.0, size, size))).sample_window(level, size)
     if r0 >= r1 or c0 >= c1:
         raise ValueError(f"no sample of level {level} lies in that window; the terrain is {size:g} m wide")
+    if (r1 - r0) * (c1 - c0) > contract.MAX_GRID_SAMPLES:
+        raise ValueError(
+            f"that window holds {c1 - c0:,} x {r1 - r0:,} samples of level {level}; a file has at most "
+            f"{contract.MAX_GRID_SAMPLES:,}"
+        )
     s = grid.spacing(level, size)
     heights = np.empty((r1 - r0, c1 - c0), dtype=np.float32)
-    covers = {name: np.empty(heights.shape, dtype=np.uint8) for name in (_covers(settings) if masks else ())}
-    band = max(1, BAND_SAMPLES // (c1 - c0))
-    for start in range(r0, r1, band):
-        stop = min(start + band, r1)
+    masks = {name: np.empty(heights.shape, dtype=np.uint8) for name in covers}
+    for start, stop in bands(r0, r1, c1 - c0):
 
         def report(share: float, start: int = start, stop: int = stop) -> None:
             if progress is not None:
@@ -198,14 +215,24 @@ def _detailed(
 
         # A quarter of a cell beyond its samples, which rounding does not lose.
         corners = ((c0 - 0.25) * s, (start - 0.25) * s, (c1 - 0.75) * s, (stop - 0.75) * s)
-        found = terrain.window(level, *corners, detail=True, progress=report, **levels)
+        found = terrain.window(level, *corners, detail=detail, progress=report, **levels)
         heights[start - r0 : stop - r0] = found.heights
-        for name, mask in covers.items():
+        for name, mask in masks.items():
             share = (
                 found.attributes[name] if name != WEAR else found.attributes["detail"] / np.float32(-wear_m(settings))
             )
             mask[start - r0 : stop - r0] = eight_bits(share)
-    return Ground(heights, c0 * s, r0 * s, s, settings, covers)
+    return Ground(heights, c0 * s, r0 * s, s, settings, masks)
+
+
+def bands(start: int, stop: int, columns: int) -> Iterator[tuple[int, int]]:
+    """Rows ``start`` to ``stop`` in parts of about BAND_SAMPLES, whole rows of tiles where there is room for one."""
+    rows = max(1, BAND_SAMPLES // columns)
+    step = max(contract.TILE_CELLS, rows - rows % contract.TILE_CELLS) if rows >= contract.TILE_CELLS else rows
+    while start < stop:
+        end = min(stop, start + step - start % step)
+        yield start, end
+        start = end
 
 
 def wear_m(settings: TerrainSettings) -> float:

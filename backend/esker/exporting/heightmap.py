@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, PngImagePlugin
 
+from esker.exporting.ground import bands
+
 SUFFIXES: Final = (".npy", ".png", ".r16")
 STEPS: Final = 65_535
 
@@ -40,5 +42,7 @@ def quantised(heights: NDArray[np.float32]) -> NDArray[np.uint16]:
     """Steps (little-endian uint16, row 0 north) of heights in metres; the largest error is half a step."""
     low, high = float(heights.min()), float(heights.max())
     scale = STEPS / (high - low) if high > low else 0.0
-    steps: NDArray[np.uint16] = np.rint((heights[::-1].astype(np.float64) - low) * scale).astype("<u2")
+    steps = np.empty(heights.shape, dtype="<u2")
+    for start, stop in bands(0, *heights.shape):
+        steps[start:stop] = np.rint((heights[::-1][start:stop].astype(np.float64) - low) * scale)
     return steps

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from esker.exporting.ground import WHOLE, Ground, Mask
+from esker.exporting.ground import WHOLE, Ground, Mask, bands
 
 ON_TOP: Final = ("water", "snow", "forest", "grass", "wetness")
 """Masks, what lies over the others first. Wetness is ground that nothing covers and that is wet."""
@@ -29,12 +29,14 @@ def weights(masks: Mapping[str, Mask]) -> dict[str, Mask]:
     is within a step of the exact one.
     """
     shape = next(iter(masks.values())).shape
-    left, steps = np.ones(shape, np.float32), np.full(shape, WHOLE, np.uint8)
-    out: dict[str, Mask] = {}
-    for name in ON_TOP:
-        if name not in masks:
-            continue
-        left *= np.float32(1.0) - masks[name].astype(np.float32) / np.float32(WHOLE)
-        rest = np.rint(left * WHOLE).astype(np.uint8)
-        out[name], steps = steps - rest, rest
-    return {**out, BARE: steps}
+    names = [name for name in ON_TOP if name in masks]
+    out = {name: np.empty(shape, np.uint8) for name in (*names, BARE)}
+    for start, stop in bands(0, *shape):
+        rows, part = slice(start, stop), (stop - start, shape[1])
+        left, steps = np.ones(part, np.float32), np.full(part, WHOLE, np.uint8)
+        for name in names:
+            left *= np.float32(1.0) - masks[name][rows].astype(np.float32) / np.float32(WHOLE)
+            rest = np.rint(left * WHOLE).astype(np.uint8)
+            out[name][rows], steps = steps - rest, rest
+        out[BARE][rows] = steps
+    return out
