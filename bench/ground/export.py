@@ -97,7 +97,7 @@ def measure_memory(wanted: tuple[tuple[str, dict[str, Any]], ...] = LARGEST) -> 
             raise RuntimeError(f"{scene}, {asked}: {last}")
         detail = "_detail" if asked["detail"] else ""
         name = f"{scene}_{asked['format']}_{asked['samples']}{detail}"
-        out[name] = {"memory_mb": most >> 20, "s": round(took, 1)}
+        out[name] = {"memory_mib": most >> 20, "s": round(took, 1)}
     return out
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +13,11 @@ import pytest
 
 from bench.ground.export import measure_memory
 from esker import Terrain, contract
-from esker.exporting import ground
+from esker.api import export_child
+from esker.contract import ExportRequest
+from esker.exporting import formats, ground, wire
 from esker.exporting.ground import Extent, bands, take
+from esker.solve.solver import Solver
 from tests.unit.test_exports import LEVEL, SIZE, exported, terrain
 
 __all__ = ["terrain"]
@@ -87,9 +92,33 @@ def test_a_window_has_a_bound(terrain: Terrain, tmp_path: Path) -> None:
             exported(terrain, tmp_path, "a.npy", level=13, window=(0, 0, SIZE, SIZE), detail=detail)
 
 
+def test_the_solver_s_memory_goes_before_what_needs_memory_of_its_own(
+    terrain: Terrain, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC X391: before masks are made of the detail, and before the file is written."""
+    said: list[object] = []
+
+    def exporting(*_: object, step: Callable[[str, float], None], **__: object) -> None:
+        for stage, share in (("detail", 0.5), ("detail", 1.0), ("writing", 0.0), ("writing", 0.5)):
+            step(stage, share)
+            said.append(share)
+
+    monkeypatch.setattr(formats, "export", exporting)
+    monkeypatch.setattr(Solver, "tidy", lambda _, now: said.append(now))
+    task = wire.Task(
+        document=terrain.document,
+        wanted=ExportRequest(format="npy", samples=257),
+        grids="",
+        folder=str(tmp_path),
+        name="a",
+    )
+    export_child._made(task, "numpy", {}, export_child.Out())
+    assert said == [0.5, math.inf, 1.0, math.inf, 0.0, 0.5]
+
+
 def test_the_benchmark_tells_what_a_process_holds() -> None:
     """What docs/exporting.md says of memory is measured on the process that a server starts."""
     (found,) = measure_memory((("alpine-ridge", {"format": "png16", "samples": 257, "detail": False}),)).values()
-    assert 50 < found["memory_mb"] < 1000
+    assert 50 < found["memory_mib"] < 1000
     with pytest.raises(RuntimeError, match=r"alpine-ridge.*300"):
         measure_memory((("alpine-ridge", {"format": "png16", "samples": 300, "detail": False}),))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import logging
+import math
 import os
 import sys
 import time
@@ -130,8 +131,15 @@ def _made(task: wire.Task, device: str | None, grids: dict[str, Raster], out: Ou
     terrain = Terrain.from_document(task.document, grids, solver, trusted=True)
     levels = {"global_level": task.global_level, "refined_level": max(task.refined_level, task.global_level)}
     path = folder / (task.name + form.suffixes[0])
+
+    def step(stage: c.ExportStage, share: float) -> None:
+        if share == {"detail": 1.0, "writing": 0.0}.get(stage):  # what follows needs memory of its own
+            solver.tidy(math.inf)
+            system.give_memory_back()
+        out.step(stage, share)
+
     ground = export(
-        terrain, path, wanted.format, extent, detail=wanted.detail, step=out.step, weights=wanted.weights,
+        terrain, path, wanted.format, extent, detail=wanted.detail, step=step, weights=wanted.weights,
         paper=wanted.paper, model=wanted.model, **levels,
     )  # fmt: skip
     if form.sent:
