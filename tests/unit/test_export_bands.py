@@ -76,7 +76,6 @@ def test_files_are_the_same_in_bands_of_any_size(
     once = [exported(terrain, tmp_path, f"once{k}.{end}", **more).read_bytes() for k, (end, more) in enumerate(MADE)]
     monkeypatch.setattr(ground, "BAND_SAMPLES", 100 * 257)
     again = [exported(terrain, tmp_path, f"again{k}.{end}", **more).read_bytes() for k, (end, more) in enumerate(MADE)]
-    assert [len(file) for file in again] == [len(file) for file in once]
     for k, (end, _) in enumerate(MADE):
         if end == "zip":
             with zipfile.ZipFile(tmp_path / f"once{k}.zip") as one, zipfile.ZipFile(tmp_path / f"again{k}.zip") as two:

@@ -133,7 +133,7 @@ def _made(task: wire.Task, device: str | None, grids: dict[str, Raster], out: Ou
     path = folder / (task.name + form.suffixes[0])
 
     def step(stage: c.ExportStage, share: float) -> None:
-        if share == {"detail": 1.0, "writing": 0.0}.get(stage):  # what follows needs memory of its own
+        if (stage, share) in (("detail", 1.0), ("writing", 0.0)):  # what follows needs memory of its own
             solver.tidy(math.inf)
             system.give_memory_back()
         out.step(stage, share)

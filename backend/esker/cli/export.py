@@ -29,7 +29,7 @@ def main(argv: list[str]) -> int:
     try:
         paper = _options(PaperOptions, options, ("size", "scale", "interval_m"), MAPS, ONLY_MAPS)
         model = _options(ModelOptions, options, ("width_mm", "base_mm", "exaggeration"), (SOLID,), ONLY_SOLIDS)
-        extent = Extent.of(options.level, options.samples, window)
+        Extent.of(options.level, options.samples, window)  # refused before anything is opened
         if format_of(options.output) != MASKS and options.weights:
             raise ValueError(ONLY_MASKS)
         if not options.output.absolute().parent.is_dir():
@@ -38,7 +38,7 @@ def main(argv: list[str]) -> int:
         parser.error(str(error))
     try:
         opened = open_terrain(options.terrain)
-        solver = Solver(options.device, max_level=min(extent.level, MAX_LEVEL))
+        solver = Solver(options.device)
         terrain = Terrain.from_document(opened.document, opened.grids, solver)
         terrain.export(
             options.output, level=options.level, samples=options.samples, window=window, detail=options.detail,

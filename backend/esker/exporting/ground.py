@@ -174,8 +174,7 @@ def _plain(terrain: HeightSource, extent: Extent, progress: Progress | None, lev
     if extent.window is None and extent.level <= levels.get("global_level", contract.DEFAULT_LEVEL):
         s = grid.spacing(extent.level, terrain.settings.size_m)
         return Ground(terrain.heights(extent.level), 0.0, 0.0, s, terrain.settings)
-    known = {"global_level": levels["global_level"]} if "global_level" in levels else {}
-    return _in_bands(terrain, extent, progress, False, known, ())
+    return _in_bands(terrain, extent, progress, False, levels, ())
 
 
 def _detailed(
