@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 import numba
+from numba.core import types
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-OPTIONS: Final[dict[str, Any]] = {"nogil": True, "boundscheck": False, "error_model": "numpy"}
+OPTIONS: Final[dict[str, Any]] = {"nogil": True, "boundscheck": False, "error_model": "numpy", "no_cfunc_wrapper": True}
+"""Nothing but Python and other loops calls a loop: a third way to call each would be compiled for nobody."""
 TRIES: Final = 8
 """Writes of an index until another process no longer replaces it meanwhile; without its line code is compiled again."""
 
@@ -25,10 +27,33 @@ def kernel(function: F) -> F:
     try:
         made: Any = numba.njit(cache=True, **OPTIONS)(function)
     except RuntimeError:  # no place on this machine to keep compiled code in
-        return cast(F, numba.njit(**OPTIONS)(function))
-    if made is not function:
+        made = numba.njit(**OPTIONS)(function)
+    if made is function:
+        return function
+    if hasattr(made._cache, "_cache_file"):
         made._cache._cache_file = LoopFiles(made._cache._cache_file)
+    _compile_once(made)
     return cast(F, made)
+
+
+def _compile_once(made: Any) -> None:
+    """Has other loops call one form of a loop, whether they pass constants, variables or integers of 32 bits.
+
+    Numba compiles a form for each constant, and another for each width of an integer, with all that the loop calls. The
+    values are those of one form: LLVM folds constants into what it inlines.
+    """
+    template = made.get_call_template
+
+    def of_values(args: tuple[Any, ...], kws: dict[str, Any]) -> Any:
+        return template(tuple(map(_value, args)), {name: _value(each) for name, each in kws.items()})
+
+    made.get_call_template = of_values
+
+
+def _value(kind: Any) -> Any:
+    """Returns the type of an argument without its value, and integers as 64 bits wide."""
+    kind = types.unliteral(kind)  # type: ignore[no-untyped-call]
+    return types.int64 if kind == types.int32 else kind
 
 
 class LoopFiles:

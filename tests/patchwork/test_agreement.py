@@ -112,7 +112,7 @@ def test_parabolas_go_on_and_noise_does_not() -> None:
     for _ in range(40):
         noise = rng.normal(0, 10, (40, 50))
         straight = np.empty((18, 18), np.float32)
-        cut(noise.astype(np.float32), 10, 38, straight)
+        cut(noise.astype(np.float32), 10, 38, straight, False)
         moved += float(np.mean(np.abs(bent_cut(noise, 10, 38, 18) - straight)[:, 12:14] > 1e-3)) / 40
     assert moved < 0.02
 

@@ -1,7 +1,8 @@
-"""Compiled loops are kept for the text and for the arguments that they were compiled for (SPEC PW59, H562)."""
+"""Compiled loops are kept for the text and for the arguments that they were compiled for (SPEC PW59, H562, H570)."""
 
 from __future__ import annotations
 
+import ast
 import itertools
 import os
 import shutil
@@ -10,7 +11,7 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import pytest
 from numba.core.caching import IndexDataCacheFile
@@ -55,6 +56,67 @@ def test_a_change_in_another_file_is_compiled_anew(tmp_path: Path) -> None:
         said.append(float(ran.stdout))
     assert said == [2.0, 21.0]
     assert len(list((room / "__pycache__").glob("compiled-*"))) == 1
+
+
+CALLS = """import numpy as np
+from esker.compiled import kernel
+
+
+@kernel
+def inner(numbers, at, backwards):
+    return numbers[len(numbers) - 1 - at] if backwards else numbers[at]
+
+
+@kernel
+def outer(numbers, places):
+    return inner(numbers, 0, False) + inner(numbers, 1, True) + inner(numbers, places[0], places[0] > 1)
+
+
+print(outer(np.arange(9.0), np.full(1, 4, np.int32)), len(inner.signatures), len(outer.signatures))
+"""
+
+
+def test_a_loop_is_compiled_once_for_constants_and_for_integers_of_any_width(tmp_path: Path) -> None:
+    """SPEC H570: numba makes a form of a loop for each constant it is called with, and for each width."""
+    (tmp_path / "calls.py").write_text(CALLS)
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    ran = subprocess.run(
+        [sys.executable, "calls.py"], cwd=tmp_path, env=os.environ | kept, capture_output=True, text=True, check=True
+    )
+    assert ran.stdout == "11.0 1 1\n"
+
+
+def test_nothing_assigns_one_array_to_a_slice_of_another() -> None:
+    """SPEC H570: numba compiles how strings are made of numbers for each, to tell of sides that differ."""
+    rooms = Path(compiled.__file__).parent
+    assigned = []
+    for path in rooms.rglob("*.py"):
+        if "@kernel" not in (text := path.read_text()):
+            continue
+        for function in ast.walk(ast.parse(text)):
+            if isinstance(function, ast.FunctionDef) and "kernel" in [
+                ast.unparse(d).split(".")[-1] for d in function.decorator_list
+            ]:
+                assigned += [f"{path.name}:{each.lineno}" for each in ast.walk(function) if slices(each)]
+    assert assigned == []
+
+
+def slices(statement: ast.AST) -> TypeGuard[ast.Assign]:
+    """Whether a slice is given anything but numbers."""
+    if not isinstance(statement, ast.Assign):
+        return False
+    sliced = [
+        isinstance(each, ast.Subscript) and any(isinstance(part, ast.Slice) for part in ast.walk(each.slice))
+        for target in statement.targets
+        for each in (target.elts if isinstance(target, ast.Tuple) else [target])
+    ]
+    values = statement.value.elts if isinstance(statement.value, ast.Tuple) else [statement.value]
+    return any(sliced) and not all(isinstance(value, ast.Constant) for value in values)
+
+
+def test_a_slice_of_an_array_is_seen() -> None:
+    said = [slices(ast.parse(text).body[0]) for text in ("a[:] = b", "a[:], b[1:2] = 0, 1", "a[1], b = c, d[2:]")]
+    assert said == [True, False, False]
 
 
 NUMBA_S: Any = IndexDataCacheFile

@@ -201,7 +201,7 @@ def test_progress_tells_its_stages() -> None:
 
 def cut_of(heights: Floats, row: int, col: int, side: int) -> Floats:
     block = np.empty((side, side), np.float32)
-    cut(heights.astype(np.float32), row, col, block)
+    cut(heights.astype(np.float32), row, col, block, False)
     return block.astype(float)
 
 

@@ -1,4 +1,4 @@
-"""SIGKILL at any moment of an import leaves the terrain without the layer or with all of it (SPEC J13)."""
+"""SIGKILL at any moment of an import leaves the terrain without the layer or with all of it (SPEC J13, J14)."""
 
 from __future__ import annotations
 

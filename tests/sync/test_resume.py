@@ -99,6 +99,7 @@ def test_ids_are_remembered_over_a_restart(tmp_path: Path) -> None:
 
 
 def test_a_stopping_server_says_so_and_saves(tmp_path: Path) -> None:
+    """SPEC P28."""
     with LiveServer(tmp_path) as server:
         terrain, secret = server.create()
         peer = server.join(terrain, secret)

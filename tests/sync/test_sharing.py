@@ -165,6 +165,29 @@ def test_previews_are_not_ended_for_a_coarse_one_and_never_more_solves_run_than_
         assert got.count("0") == got.count("4"), "a preview that was begun is shown whole"
 
 
+def test_what_settles_is_settled_room_by_room_the_smallest_terrain_first() -> None:
+    """SPEC S506: interleaved, all of them would come late."""
+    desk = Desk()
+    rooms = {levels: desk.room(levels) for levels in (4, 2, 3)}
+    for room in rooms.values():
+        desk.ask(room)
+    desk.until(rooms[4], "4s")
+    settled = [room for room, what in desk.log if what.endswith("s")]
+    assert settled == [rooms[levels] for levels in (2, 3, 4) for _ in range(levels + 1)]
+
+
+def test_of_terrains_of_one_size_the_one_that_was_begun_first_settles_first() -> None:
+    """SPEC S506."""
+    desk = Desk()
+    first, second = desk.room(), desk.room()
+    desk.ask(first)
+    desk.until(first, "0s")
+    desk.ask(second)
+    desk.until(second, "2s")
+    settled = [room for room, what in desk.log if what.endswith("s")]
+    assert settled == [first] * 3 + [second] * 3
+
+
 def test_a_solve_bigger_than_the_budget_still_runs_alone() -> None:
     desk = Desk(budget=parked_bytes(4))
     big, small = desk.room(6), desk.room(4)

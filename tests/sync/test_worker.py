@@ -44,6 +44,7 @@ DRAWN = Job(2, (), SETTINGS, heights_rev=2, paint_rev=1, number=2)
 PAINTED = Job(3, (), SETTINGS, heights_rev=1, paint_rev=2, number=3)
 SNOW = ChannelLevel(0, FLAT, c.Channel.SNOW)
 AT_HAND = ChannelLevel(0, FLAT, c.Channel.SNOW, more=True)
+"""SPEC S585: a level that was not computed, behind which the next event comes with the same turn."""
 GROUND = BaseLevel(0, FLAT, c.Channel.BASE)
 SOON = Shown(lead={0: 0.1, 1: 0.05}, finest_at=NOW - 0.1)
 SETTLED = Shown(heights=((1, 0), TOP), clock=1)
@@ -135,7 +136,8 @@ TABLE: list[tuple[Ground, Event, State, tuple[Effect, ...]]] = [
     (ground(Settling(JOB), channels=MAKING), does.Beside(SNOW), Settling(JOB), (does.Deliver(PAINTED, SNOW),)),
     (ground(Settling(JOB), channels=MAKING), does.Beside(Pause()), Settling(JOB), NONE),
     (ground(Settling(JOB), channels=MAKING), does.Beside(Done()), Settling(JOB), NONE),
-    (ground(Settling(JOB), channels=MAKING), SNOW, Settling(JOB), (does.GiveBack(),)),  # a newer job's came already
+    # SPEC P120; a newer job's channels came already
+    (ground(Settling(JOB), channels=MAKING), SNOW, Settling(JOB), (does.GiveBack(),)),
     (ground(Idle(), channels=MAKING), does.Turn(begins=False), Idle(), (does.StepBeside(),)),
     # channels only
     (

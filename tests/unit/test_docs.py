@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -127,6 +128,29 @@ def test_rules_that_tests_cite_are_written_down() -> None:
              for line in re.findall(r"\(?SPEC ([^\n]*)", text(path)) for rule in RULE.findall(line)}  # fmt: skip
     assert len(cited) > 300
     assert sorted((rule, path) for rule, path in cited if rule not in rules) == []
+
+
+def rules_in(words: str) -> set[str]:
+    """All rules that a text names: one by one, or from the first to the last of several."""
+    named = set(RULE.findall(words))
+    for letters, first, last in re.findall(r"\b([A-Z]{1,2})(\d+)(?: to |\.\.|-|–)(?:\1)?(\d+)\b", words):
+        named |= {f"{letters}{number}" for number in range(int(first), min(int(last), int(first) + 60) + 1)}
+    return named
+
+
+def test_every_rule_is_cited_by_a_test_and_stands_once() -> None:
+    """SPEC H571."""
+    written = [rule for path in DOCUMENTS if "/spec/" in path or path.endswith("SPEC.md")
+               for rule in re.findall(r"^- \*\*([A-Z]+\d+)\*\*", text(path), re.M)]  # fmt: skip
+    assert [rule for rule, times in Counter(written).items() if times > 1] == []
+    tests = [path for path in files() if path.endswith((".py", ".ts")) and re.match(r"tests/|frontend/test/", path)]
+    named = set.union(*(rules_in(text(path)) for path in tests))
+    assert [rule for rule in written if rule not in named] == []
+
+
+def test_ranges_of_rules_are_read() -> None:
+    said = "SPEC E1..E3, D27 to D29, H1"
+    assert rules_in(said) == {"E1", "E2", "E3", "D27", "D28", "D29", "H1"}
 
 
 def paragraphs_with(pattern: str) -> Iterator[tuple[str, str]]:

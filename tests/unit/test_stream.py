@@ -138,7 +138,7 @@ def test_whoever_has_applied_all_before_it_is_known_to_be_all_is_no_newcomer() -
 
 
 def test_little_at_a_time_is_made_for_newcomers() -> None:
-    """SPEC P642: a go of theirs took fifty milliseconds, and others' tiles waited."""
+    """SPEC P93, P642: a go of theirs took fifty milliseconds, and others' tiles waited."""
     stream = Stream(Outlet())
     assert stream.most == FIRST_BATCH_BYTES
     stream.newcomer = False

@@ -1,4 +1,4 @@
-"""Texts that a client may send, each accepted or refused by the contract."""
+"""Texts that a client may send, each accepted or refused by the contract (SPEC P1, D310)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cases of ``StrokeSet.apply``: every op, every refusal that a small document can show."""
+"""Cases of ``StrokeSet.apply``: every op, every refusal that a small document can show (SPEC D25, D27 to D29, D401)."""
 
 from __future__ import annotations
 

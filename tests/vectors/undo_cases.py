@@ -1,4 +1,4 @@
-"""Scripts of one person's undo stack while others work on the same document.
+"""Scripts of one person's undo stack while others work on the same document (SPEC D23, D24).
 
 A step is one of ``{"mine": op, "gesture": token or null}``, ``{"theirs": op}``, and ``{"undo": {"ops", "skipped"}}`` or
 ``{"redo": ...}`` with what must come out; the ops that come out are applied to the document.

@@ -75,7 +75,8 @@ def _carry(coarse: Grid, row0: int, col0: int, side: int, r0: int, c0: int, out:
     for row in range(rows):
         y = (r0 + row) // 2
         if (r0 + row) % 2 == 0:
-            line[:] = coarse[y - row0]
+            for k in range(line.size):
+                line[k] = coarse[y - row0, k]
         else:
             a, b = coarse[max(y - 1, 0) - row0], coarse[y - row0]
             c, d = coarse[min(y + 1, side - 1) - row0], coarse[min(y + 2, side - 1) - row0]

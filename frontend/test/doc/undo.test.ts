@@ -40,7 +40,7 @@ describe("settling", () => {
     expect(undone.strokes).toEqual(BASE.strokes);
   });
 
-  it("only ops that are not committed can be forgotten", () => {
+  it("only ops that are not committed can be forgotten, as those that are refused (SPEC D22)", () => {
     const { stack, doc } = recorded([label("a"), label("b"), hide]);
     stack.settle("c:0");
     stack.settle("c:1");

@@ -94,11 +94,15 @@ def fill_patches(
         if not _plain_patch(mip, rows[k], cols[k], side, scale, lift, heights):
             samples = np.empty((side, side), np.float32)
             cut(mip, rows[k], cols[k], samples, bent)
-            heights[:side, :side] = samples.astype(np.float64) * scale + lift
+            for r in range(side):
+                for c in range(side):
+                    heights[r, c] = np.float64(samples[r, c]) * scale + lift
         if smooth:
             prefilter(heights, side, stored[places[k]])
         else:
-            stored[places[k], :side, :side] = heights[:side, :side]
+            for r in range(side):
+                for c in range(side):
+                    stored[places[k], r, c] = heights[r, c]
 
 
 @kernel
@@ -148,6 +152,14 @@ def columns(
 
 
 @kernel
+def copy_bin(source: NDArray[np.float32], target: NDArray[np.float32]) -> None:
+    """Copy values of a bin. Numba takes seconds to compile the assignment of one array to a slice of another."""
+    for row in range(BIN):
+        for col in range(BIN):
+            target[row, col] = source[row, col]
+
+
+@kernel
 def smooth_bins(
     start: NDArray[np.int32],
     patch: NDArray[np.int32],
@@ -176,7 +188,7 @@ def smooth_bins(
         for entry in range(start[at], start[at + 1]):
             k = patch[entry]
             if entry > start[at] and rank[k] != rank[patch[entry - 1]]:
-                veil[:] = bare
+                copy_bin(bare, veil)
             c = coefficients[k].ravel()
             mid_u, mid_v, per_u, per_v, ku0, ku1, kv0, kv1, volume = constants[k]
             du, dv = step[k, 0], step[k, 1]
@@ -260,7 +272,7 @@ def linear_bins(
         for entry in range(start[at], start[at + 1]):
             k = patch[entry]
             if entry > start[at] and rank[k] != rank[patch[entry - 1]]:
-                veil[:] = bare
+                copy_bin(bare, veil)
             c = coefficients[k].ravel()
             mid_u, mid_v, per_u, per_v, ku0, ku1, kv0, kv1, volume = constants[k]
             end, du, dv = np.int32(side[k] - 2), step[k, 0], step[k, 1]

@@ -142,7 +142,8 @@ def least_cover(
     while waiting:
         waiting -= 1
         depth, limit = depths[waiting], limits[waiting]
-        part[:] = quads[waiting]
+        for k in range(4):
+            part[k, 0], part[k, 1] = quads[waiting, k, 0], quads[waiting, k, 1]
         asked = lists[depth - 1, : held[depth - 1]]
         met, limit = _meeting(kernels, slack, min_z, part, whole * 0.25**depth, x, y, asked, limit, lists[depth])
         if limit <= found or (whether and limit < best):

@@ -92,7 +92,7 @@ def _distances(
         out[work] = -1.0
         if top >= end:
             continue
-        cut(mip, first[p, 0], first[p, 1], block)
+        cut(mip, first[p, 0], first[p, 1], block, False)
         for r in range(side):
             for c in range(side):
                 metres[r, c] = gain[0] * block[r, c] + gain[1]

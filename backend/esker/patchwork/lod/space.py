@@ -81,7 +81,7 @@ class Model:
         for k, p in enumerate(np.asarray(index).tolist()):
             placed = self.placed[self.owner[p]]
             block = out[offsets[k] : offsets[k + 1]].reshape(sides[k], sides[k])
-            cut(placed.raster.mips[self.level[p]], int(self.row[p]), int(self.col[p]), block)
+            cut(placed.raster.mips[self.level[p]], int(self.row[p]), int(self.col[p]), block, False)
             if placed.layer.scale != 1.0 or placed.layer.lift_m != 0.0:
                 block[:] = placed.layer.scale * block.astype(np.float64) + placed.layer.lift_m
         return out, offsets

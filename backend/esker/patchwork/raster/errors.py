@@ -257,7 +257,7 @@ def _patch_errors(
         side = max(kernels[p, 2], kernels[p, 3]) + 4
         if side != len(block):
             block, exact = np.empty((side, side), np.float32), np.empty((side, side))
-        cut(mip, kernels[p, 0] - 2, kernels[p, 1] - 2, block)
+        cut(mip, kernels[p, 0] - 2, kernels[p, 1] - 2, block, False)
         for r in range(side):
             for c in range(side):
                 exact[r, c] = block[r, c]

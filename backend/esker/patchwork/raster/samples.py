@@ -63,7 +63,7 @@ def beyond(line: NDArray[np.float32], low: bool) -> float:
 
 
 @kernel
-def cut(mip: NDArray[np.float32], row: int, col: int, out: NDArray[np.float32], bent: bool = False) -> None:
+def cut(mip: NDArray[np.float32], row: int, col: int, out: NDArray[np.float32], bent: bool) -> None:
     """Copy the samples of ``mip`` from [row, col] on to ``out`` (side, side).
 
     Beyond the level's border its slope goes on, along rows first, and its bend where ``bent``. Nodata, which only lies
@@ -78,8 +78,16 @@ def cut(mip: NDArray[np.float32], row: int, col: int, out: NDArray[np.float32], 
                 wide = np.empty((side + 2 * deep, side + 2 * deep), np.float32)
                 _copy(mip, row - deep, col - deep, wide, bent)
                 fill(wide, bent)
-                out[:] = wide[deep:-deep, deep:-deep]
+                _middle(wide, deep, out)
                 return
+
+
+@kernel
+def _middle(wide: NDArray[np.float32], deep: int, out: NDArray[np.float32]) -> None:
+    """What lies ``deep`` samples within ``wide``. One slice assigned to another would take seconds to compile."""
+    for r in range(out.shape[0]):
+        for c in range(out.shape[1]):
+            out[r, c] = wide[deep + r, deep + c]
 
 
 @kernel

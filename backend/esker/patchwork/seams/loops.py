@@ -28,7 +28,7 @@ from esker.patchwork.blend.jets import (
     total,
     weights,
 )
-from esker.patchwork.blend.loops import BIN, columns, fade
+from esker.patchwork.blend.loops import BIN, columns, copy_bin, fade
 from esker.patchwork.jit import kernel
 
 Floats = NDArray[np.float64]
@@ -401,7 +401,7 @@ def correct_bins(
         for entry in range(start[at], start[at + 1]):
             k = patch[entry]
             if entry > start[at] and rank[k] != rank[patch[entry - 1]]:
-                veil[:] = bare
+                copy_bin(bare, veil)
             if place[k] != held:
                 held = place[k]
                 v_of[:] = 0
