@@ -37,10 +37,10 @@ def kernel(function: F) -> F:
 
 
 def _compile_once(made: Any) -> None:
-    """Has other loops call one form of a loop, whether they pass constants, variables or integers of 32 bits.
+    """Has other loops call one form of a loop, whether they pass constants or variables.
 
-    Numba compiles a form for each constant, and another for each width of an integer, with all that the loop calls. The
-    values are those of one form: LLVM folds constants into what it inlines.
+    Numba compiles a form for each constant, with all that the loop calls. The values are those of one form: LLVM folds
+    constants into what it inlines.
     """
     template = made.get_call_template
 
@@ -51,9 +51,8 @@ def _compile_once(made: Any) -> None:
 
 
 def _value(kind: Any) -> Any:
-    """Returns the type of an argument without its value, and integers as 64 bits wide."""
-    kind = types.unliteral(kind)  # type: ignore[no-untyped-call]
-    return types.int64 if kind == types.int32 else kind
+    """Returns the type of an argument without its value."""
+    return types.unliteral(kind)  # type: ignore[no-untyped-call]
 
 
 class LoopFiles:
