@@ -1,7 +1,9 @@
-"""Loops of elevation layers are compiled by a child before the first base (SPEC H564)."""
+"""Loops of elevation layers are compiled by a child before the first base (SPEC H564, H565, H572)."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -62,6 +64,66 @@ def test_they_have_more_time_than_kernels(
 def test_what_the_child_runs_is_ground() -> None:
     """Two layers at an angle, one with a hole: were they refused, nothing would be compiled."""
     warming.warm()
+
+
+LAYS = """
+import gc
+import sys
+from pathlib import Path
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+from esker import contract as c
+from esker.patchwork import warming
+from esker.patchwork.base import Base
+from esker.patchwork.lod import space
+from esker.patchwork.raster import rasters
+
+SIZE_M = 4096.0
+
+
+def forms():
+    return {
+        (each.py_func.__module__, each.py_func.__name__, form)
+        for each in gc.get_objects() if isinstance(each, Dispatcher) and each.py_func.__module__.startswith("esker")
+        for form in each.signatures
+    }
+
+
+def laid(name, warp, **place):
+    heights = np.add.outer(np.arange(90.0), np.sin(np.arange(110.0))).astype(np.float32)
+    heights[40:45, 50:70] = np.nan
+    raster = rasters.build(heights, warp)
+    rasters.write(Path(sys.argv[1], name), raster)
+    raster = rasters.read(Path(sys.argv[1], name))
+    return space.Placed(c.Layer(id=name, content=raster.digest, facts=raster.facts(), **place), raster)
+
+
+warming.warm()
+before = forms()
+base = None
+layers = []
+for name, warp, place in (
+    ("plain", None, {"anchor": (900.0, 900.0), "spacing_m": (14.0, 14.0), "accuracy_m": 2.0}),
+    ("turned", None, {"anchor": (1500.0, 1200.0), "spacing_m": (6.0, 7.0), "rotation_deg": 33.0, "accuracy_m": 0.0}),
+    ("bent", np.full((3, 4, 2), 0.3), {"anchor": (700.0, 1400.0), "spacing_m": (9.0, 9.0), "accuracy_m": 0.0}),
+):
+    layers.append(laid(name, warp, **place))
+    base = Base(space.build(layers, base and base.model), SIZE_M, base, c.CURRENT_EDITION)
+    for level in range(4):
+        base.level(level)
+        base.survey(level)
+    base.window(5, slice(100, 200), slice(300, 400))
+for module, name, form in sorted(forms() - before, key=str):
+    print(module, name, [each for each in map(str, form)])
+"""
+
+
+def test_a_server_s_first_layers_need_no_other(tmp_path: Path) -> None:
+    """SPEC H572: what the child compiles is what rooms run, for arrays that are kept too, which may not be written."""
+    ran = subprocess.run([sys.executable, "-c", LAYS, str(tmp_path)], capture_output=True, text=True, check=True)
+    assert ran.stdout == ""
 
 
 def test_the_first_base_waits_for_them_and_later_ones_do_not(laid: tuple[GridStore, c.Layer]) -> None:

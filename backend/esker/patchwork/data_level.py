@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import BASE_SURVEY, TILE_CELLS
-from esker.patchwork.jit import bands, kernel, spread
+from esker.patchwork.jit import bands, kernel, read_only, spread
 from esker.patchwork.lod.space import Model, Placed
 
 
@@ -27,7 +27,7 @@ def levels(model: Model, size_m: float, samples: int) -> NDArray[np.float32]:
 def _lay(placed: Placed, size_m: float, out: NDArray[np.float32]) -> None:
     layer, raster = placed.layer, placed.raster
     level = math.log2(size_m / (TILE_CELLS * math.sqrt(layer.spacing_m[0] * layer.spacing_m[1])))
-    warp = raster.warp if raster.warp is not None else np.zeros((2, 2, 2))
+    warp = raster.warp if raster.warp is not None else read_only(np.zeros((2, 2, 2)))
     turn = math.radians(layer.rotation_deg)
     c, s = math.cos(turn), math.sin(turn)
     to_lattice = np.array([[c / layer.spacing_m[0], s / layer.spacing_m[0]],

@@ -12,15 +12,16 @@ import os
 import shutil
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Final
+from typing import Any, Final
 
 import numba
+import numpy as np
 
 from esker import compiled
 from esker.patchwork import kept_loops
 from esker.process import caches, system
 
-__all__ = ["bands", "kernel", "processors", "spread"]
+__all__ = ["bands", "kernel", "processors", "read_only", "spread"]
 
 
 def _keep_by_content() -> str | None:
@@ -55,6 +56,16 @@ def kernel(function: compiled.F) -> compiled.F:
         return compiled.kernel(function)
     finally:
         numba.config.CACHE_DIR = before  # type: ignore[attr-defined]
+
+
+def read_only(array: Any) -> Any:
+    """A read-only base-class view: one kind of array for the compiled loops, whoever made it.
+
+    Numba compiles a loop once more for arrays that may be written. What is kept may not be; what was just made may.
+    """
+    view = np.asarray(array).view(np.ndarray)
+    view.flags.writeable = False
+    return view
 
 
 def processors() -> int:

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.patchwork.blend.jets import spline_jet
-from esker.patchwork.jit import bands, kernel, spread
+from esker.patchwork.jit import bands, kernel, read_only, spread
 
 Grid = NDArray[np.float32]
 
@@ -54,6 +54,7 @@ def _sweep(before: Grid, heights: Grid, cover: Grid, first: int, last: int, afte
 def relax(ground: Grid, heights: Grid, cover: Grid, sweeps: int) -> Grid:
     """``ground`` after sweeps of F <- m f + (1 - m) mean of four; indices beyond the arrays are clamped."""
     other = np.empty_like(ground)
+    heights, cover = read_only(heights), read_only(cover)
     for _ in range(sweeps):
         source, target = ground, other
 
@@ -98,7 +99,7 @@ def carry(coarse: Grid, row0: int, col0: int, side: int, rows: slice, cols: slic
     ``coarse[0, 0]`` is sample [row0, col0]; the window must hold what ``needed`` says.
     """
     out = np.empty((rows.stop - rows.start, cols.stop - cols.start), dtype=np.float32)
-    _carry(np.ascontiguousarray(coarse), row0, col0, side, rows.start, cols.start, out)
+    _carry(read_only(np.ascontiguousarray(coarse)), row0, col0, side, rows.start, cols.start, out)
     return out
 
 

@@ -22,7 +22,7 @@ LEVEL: Final = 2
 
 
 def warm() -> None:
-    """Makes the base of a survey, then that of a finer one with a hole laid across it, and asks all that rooms ask."""
+    """Makes bases of a survey, of a finer one with a hole across it and of a third, and asks all that rooms ask."""
     heights = np.random.default_rng(1).random((SIDE, SIDE), dtype=np.float32) * 90
     torn = heights.copy()
     torn[20:40, 50:70] = np.nan
@@ -30,12 +30,14 @@ def warm() -> None:
         survey = _placed(heights, Path(folder) / "survey", "survey", anchor=(900.0, 900.0), spacing_m=(10.0, 10.0))
         place: dict[str, Any] = {"anchor": (1400.0, 1300.0), "spacing_m": (5.0, 5.0), "rotation_deg": 27.0}
         finer = _placed(torn, Path(folder) / "finer", "finer", **place)
+        third = _placed(heights, Path(folder) / "third", "third", anchor=(1500.0, 1500.0), spacing_m=(3.0, 3.0))
         for edition in (1, c.CURRENT_EDITION):
             before = Base(space.build([survey]), SIZE_M, None, edition)
             _asked(before)
             after = Base(space.build([survey, finer], before.model), SIZE_M, before, edition)
             after.changed(before)
             _asked(after)
+        _asked(Base(space.build([survey, finer, third], after.model), SIZE_M, after, c.CURRENT_EDITION))
 
 
 def _placed(heights: NDArray[np.float32], folder: Path, name: str, **place: Any) -> Placed:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from esker.contract import PATCH_KERNEL_CELLS
-from esker.patchwork.jit import bands, kernel, spread
+from esker.patchwork.jit import bands, kernel, read_only, spread
 from esker.patchwork.raster import paging, patches, rim
 from esker.patchwork.raster.patches import Floats, PatchErrors
 from esker.patchwork.raster.samples import beyond, cut, row_beyond
@@ -23,7 +23,7 @@ Heights = NDArray[np.float32]
 Ints = NDArray[np.int64]
 PART_ROWS: Final = 256
 """Rows of samples that a patch is measured at in one go, at most."""
-NO_WARP = np.zeros((0, 0, 2))
+NO_WARP = read_only(np.zeros((0, 0, 2)))
 
 
 @kernel

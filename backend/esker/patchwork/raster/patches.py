@@ -130,7 +130,7 @@ def lay_rim(rows: int, cols: int, warp: Floats | None, rim: NDArray[np.int32]) -
 def _laid(rows: int, cols: int, warp: Floats | None, step: int, low: Floats, high: Floats) -> Lattice:
     """Patches with kernels low..high (n, 2), x and y in area coordinates, of a level with samples ``step`` apart."""
     margin = PATCH_MARGIN_CELLS * step
-    extent = (high - low + 2 * margin) / step
+    extent = np.ascontiguousarray((high - low + 2 * margin) / step)
     kernel = warped(warp, rows, cols, _corners(low, high) - 0.5)
     origin = low - margin - 0.5
     to_patch = np.zeros((len(low), 2, 3))

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from esker import contract
+from esker.patchwork.jit import read_only
 from esker.patchwork.raster import errors, mipmaps, patches
 from esker.patchwork.raster.outline import bent_edge
 from esker.patchwork.raster.paging import let_go
@@ -80,7 +81,7 @@ def build(heights: NDArray[Any], warp: NDArray[np.float64] | None = None, progre
     ``contract.MIN_GRID_SIDE`` a side, larger than ``MAX_GRID_SAMPLES``, holds no valid sample, or the net is no net.
     """
     check_shape(heights.shape)
-    return _finish(_read_only(_clean(heights)), _net(warp), None, progress)
+    return _finish(read_only(_clean(heights)), _net(warp), None, progress)
 
 
 def build_out_of_core(
@@ -98,7 +99,7 @@ def build_out_of_core(
     directory.mkdir(parents=True, exist_ok=True)
     _own_heights(heights, directory / HEIGHTS)
     mapped: Heights = np.load(directory / HEIGHTS, mmap_mode="r")
-    raster = _finish(_read_only(mapped), _net(warp), directory, progress)
+    raster = _finish(read_only(mapped), _net(warp), directory, progress)
     _write_rest(directory, raster)
     return raster
 
@@ -153,7 +154,7 @@ def _read_errors(raster_dir: Path, levels: int, shape: tuple[int, int]) -> Patch
             raise RasterError(f"{raster_dir.name}: its patch errors do not fit it")
     found, measured = np.load(raster_dir / RIM, allow_pickle=False), np.load(raster_dir / RIM_ERRORS)
     _check_rim(raster_dir, found, measured, shape)
-    return PatchErrors(tuple(_read_only(table) for table in tables), _read_only(found), _read_only(measured))
+    return PatchErrors(tuple(read_only(table) for table in tables), read_only(found), read_only(measured))
 
 
 def _check_rim(raster_dir: Path, found: NDArray[Any], measured: NDArray[Any], shape: tuple[int, ...]) -> None:
@@ -239,7 +240,7 @@ def _finish(
             return np.empty(shape, np.float32)
         return np.lib.format.open_memmap(directory / _mip_name(level), "w+", np.float32, shape)
 
-    mips = tuple(_read_only(mip) for mip in mipmaps.mipmaps(heights, made))
+    mips = tuple(read_only(mip) for mip in mipmaps.mipmaps(heights, made))
     say("mipmaps", 1.0)
     measured = errors.measure(mips, warp, lambda share: say("errors", share))
     return Raster(heights, mips, warp, measured, digest(heights, warp), low, high, valid)
@@ -309,13 +310,6 @@ def _net(warp: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
     return net
 
 
-def _read_only(array: Any) -> Any:
-    """A read-only base-class view: one kind of array for the compiled loops, whoever made it."""
-    view = np.asarray(array).view(np.ndarray)
-    view.flags.writeable = False
-    return view
-
-
 def _mip_name(level: int) -> str:
     return HEIGHTS if level == 0 else f"mip{level}.npy"
 
@@ -330,7 +324,7 @@ def _open(path: Path, shape: tuple[int, int]) -> Heights:
         raise RasterError(
             f"{path.parent.name}: {path.name} is {mapped.dtype} {mapped.shape}, not float32 {tuple(shape)}"
         )
-    found: Heights = _read_only(mapped)
+    found: Heights = read_only(mapped)
     return found
 
 
