@@ -10,8 +10,12 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 from esker.contract import MAX_LAYERS
 from esker.patchwork.raster import rasters
+from esker.process import system
 from esker.store.grids import GridStore
 from esker.store.journal import Journal
 
@@ -57,6 +61,24 @@ def test_killed_while_importing(tmp_path: Path) -> None:
             lives += 1
         assert zygote.stdin is not None
         zygote.stdin.close()
+
+
+def test_a_grid_is_on_the_disk_before_it_has_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC J14: no kill shows what a machine without power would have lost."""
+    store, raster = GridStore(tmp_path), rasters.build(np.add.outer(np.arange(40.0), np.arange(50.0)))
+    named = store.path(raster.digest)
+    synced: list[tuple[str, bool]] = []
+    sync = system.sync
+
+    def noted(path: Path) -> None:
+        synced.append((path.name, named.exists()))
+        sync(path)
+
+    monkeypatch.setattr(system, "sync", noted)
+    store.put(raster)
+    before = {name for name, has_name in synced if not has_name}
+    assert before == {"raster", *(path.name for path in named.iterdir())}
+    assert synced[-1] == (store.folder.name, True), "the name itself, then"
 
 
 def _check(data: Path, said: list[str], lives: int) -> bool:

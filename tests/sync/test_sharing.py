@@ -255,7 +255,8 @@ def test_a_newer_job_shows_its_coarsest_level_while_a_pass_goes_on() -> None:
     ground, _ = machine.next(ground, does.Requested(Job(3, (), SETTINGS)), 0.03)
     ground = replace(ground, state=Previewing(newer, reached=0, previews_early=True))
     assert not states.early_preview_is_due(ground, 0.03), "the pass has not gone on since the last"
-    assert states.early_preview_is_due(ground, 0.03 + states.EARLY_EVERY), "SPEC S590: it waits for others"
+    # SPEC S590: it waits for others.
+    assert states.early_preview_is_due(ground, 0.03 + states.EARLY_EVERY)
     ground = replace(ground, early=Early(newer.number, made=True))
     assert states.early_preview_is_due(ground, 0.03), "its coarsest level is out"
 

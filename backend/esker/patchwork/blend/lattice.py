@@ -111,7 +111,8 @@ def extents(
     end = (side - 1.0)[:, None]
     grown_low, grown_high = np.maximum(low - PATCH_MARGIN_CELLS, 0.0), np.minimum(high + PATCH_MARGIN_CELLS, end)
     order = [0, 2, 1, 3]
-    return np.hstack([low, high])[:, order], np.hstack([grown_low, grown_high])[:, order]
+    inner, outer = np.hstack([low, high])[:, order], np.hstack([grown_low, grown_high])[:, order]
+    return np.ascontiguousarray(inner), np.ascontiguousarray(outer)  # one kind of array for the compiled loops
 
 
 def identities(model: Model, index: NDArray[np.int32]) -> NDArray[np.uint64]:

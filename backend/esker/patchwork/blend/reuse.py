@@ -53,7 +53,6 @@ def changed_bins(model: Model, other: Model, tolerance: float, lattice: Lattice)
         to_patch = m.to_patch[index]
         _, domain = extents(m.kernel[index], to_patch, m.side[index].astype(np.int32))
         pitch, reach = BIN * lattice.spacing, (BIN - 1) * lattice.spacing
-        domain = np.ascontiguousarray(domain)  # as elsewhere: the loop is compiled once
         empty = np.empty(0, np.int32), np.empty((0, 2), np.float32)
         bin_patches(to_patch, domain, pitch, reach, r0, r1, c0, c1, found, *empty)
         hit |= found[1:] > 0
