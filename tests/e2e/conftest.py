@@ -34,6 +34,10 @@ LEVEL = 3
 """The finest level that servers of these tests solve as a whole; the product's own is one more, which is four times as
 many tiles to solve, send, unpack and draw. Two people who sketch one terrain have that (``test_together.py``)."""
 
+NO_PREVIEWS = {"ESKER_PREVIEWS": "false"}
+"""Pictures for programs that unfold links took a twentieth of what these tests take; nobody here looks at them. They
+are drawn in ``tests/render/test_previews.py`` and by the server of ``tests/elsewhere/test_wheel.py``."""
+
 SCALE = 0.25
 """Drawn pixels per CSS pixel, along a side: hands, layout and errors are those of the whole window, but the software
 adapter draws a sixteenth of its pixels. Where the picture itself is looked at, tests ask for 1. Windows of fewer pixels
@@ -106,7 +110,7 @@ class Server:
             self.process = subprocess.Popen(
                 [*command, *self.options],
                 cwd=ROOT,
-                env=os.environ | {"ESKER_LEVEL": str(self.level)} | self.environment,
+                env=os.environ | {"ESKER_LEVEL": str(self.level)} | NO_PREVIEWS | self.environment,
                 stdout=log,
                 stderr=log,
             )

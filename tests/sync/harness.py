@@ -93,6 +93,8 @@ class LiveServer:
         # the look takes half of what a start takes, and a server finds nothing of its own there.
         if next(STARTS) % LOOKED_EVERY:
             gc.freeze()
+        else:
+            gc.unfreeze()
         self._thread.start()
         deadline = time.monotonic() + 30
         while not self._server.started:
@@ -108,6 +110,7 @@ class LiveServer:
         self._server.should_exit = True
         self._thread.join(timeout=30)
         self.assembly.close()
+        gc.freeze()  # the server that ended took back what was set aside, all modules among it
 
     @property
     def base(self) -> str:

@@ -279,6 +279,7 @@ class Assembly:
                 grids=self.settings.data / FOLDER,
                 fetch=self._grids.fetch_all,
                 made=made,
+                draws=self.settings.previews,
             ),
             PreviewTokens(self._journal),
             self.settings.public_url.rstrip("/") if self.settings.public_url else None,

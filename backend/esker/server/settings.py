@@ -59,6 +59,9 @@ class Settings:
     """Where the other nodes reach this one: http://10.0.0.5:8000"""
     cluster_key: str = field(default="", repr=False)
     """What all nodes of a cluster have together, and nobody else."""
+    previews: bool = True
+    """Whether pictures of shared terrains are drawn: each takes some eight seconds of a processor, at the lowest
+    priority."""
     metrics: str = ""
     """Who may read ``/metrics``: addresses and networks, separated by commas. "*": everybody. Empty: nobody."""
 

@@ -78,10 +78,11 @@ class Previews:
         painter: Painter | None = None,
         executor: Callable[[], Executor] | None = None,
         now: Callable[[], float] = time.monotonic,
+        draws: bool = True,
     ) -> None:
         """``folder``: where pictures are kept, made when needed. ``grids``: where the rasters of elevation layers lie,
         by digest; ``fetch`` brings those of a document there. ``made``: where all servers have their pictures.
-        ``painter``, ``executor``, ``now``: others, for tests."""
+        ``painter``, ``executor``, ``now``: others, for tests. ``draws``: whether pictures are drawn here at all."""
         self._fetch, self._made = fetch, Made() if made is None else made
         self._folder, self._device, self._now = folder, device, now
         self._painter = painter or partial(paint, grids=grids)
@@ -93,8 +94,8 @@ class Previews:
         self._ahead: set[asyncio.Future[Path]] = set()
         self._drawn: dict[str, float] = {}
         self._used = 0.0
-        self.available = True
-        """False once it has turned out that nothing can be drawn here."""
+        self.available = draws
+        """False where nothing shall be drawn, and once it has turned out that nothing can be drawn here."""
 
     def held(self, terrain: str) -> Path | None:
         """The newest picture of a terrain on disk."""
