@@ -179,17 +179,34 @@ class Access:
 
     def check(self, terrain: str, secret: str) -> Link | None:
         """The link of this terrain that has this secret (see ``revoked``), or None."""
+        found = self.opening(terrain, secret)
+        return None if found is None else found[0]
+
+    def opening(self, terrain: str, secret: str) -> tuple[Link, float | None] | None:
+        """The link of this terrain that has this secret, and when the terrain was deleted (None: it was not), by one
+        question: each gives the interpreter's lock away several times, and whoever asks waits for it in a busy server.
+        """
         digest = hashed(secret)
-        for row in self._journal.reader().execute(f"SELECT {_COLUMNS} FROM links WHERE hash=?", (digest,)):
+        for row in self._journal.reader().execute(f"SELECT {_COLUMNS},{_DELETED} FROM links WHERE hash=?", (digest,)):
             link = _link(row)
             same = hmac.compare_digest(link.digest, digest)
             if same and link.terrain == terrain:  # an id is no secret, and may be any text here
-                return link
+                return link, None if row[8] is None else float(row[8])
         return None
 
     def alive(self, link: Link) -> bool:
         """Returns whether a link that was opened before is neither revoked nor renewed since."""
         return _alive(self._journal.reader(), link)
+
+    def opens(self, link: Link) -> bool:
+        """Returns whether a link that was opened before still opens its terrain: it lives, and the terrain was not
+        deleted. One question, as in ``opening``."""
+        row = (
+            self._journal.reader()
+            .execute(f"SELECT hash,{_DELETED} FROM links WHERE id=? AND revoked IS NULL", (link.id,))
+            .fetchone()
+        )
+        return row is not None and row[1] is None and hmac.compare_digest(bytes(row[0]), link.digest)
 
     def links(self, terrain: str) -> list[Link]:
         """All links of a terrain, oldest first, revoked ones too."""
@@ -335,6 +352,7 @@ _FORGET: Final = (
 )
 """A link that was revoked has no living children: they ended in the same commit."""
 _COLUMNS: Final = "id,terrain,role,name,created,revoked,parent,hash"
+_DELETED: Final = "(SELECT deleted FROM terrains WHERE terrains.id=links.terrain)"
 
 
 def _link(row: Sequence[Any]) -> Link:

@@ -38,16 +38,17 @@ class Door:
 
     def authorise(self, terrain: str, secret: str, address: str) -> Link:
         """Returns the live link behind a secret. Raises Denied (no_terrain, bad_secret, revoked, rate_limited)."""
-        link = self._access.check(terrain, secret)
-        if link is None:
+        found = self._access.opening(terrain, secret)
+        if found is None:
             if not self._wrong.take(Who(address), self._now()):
                 raise Denied("rate_limited", "Too many wrong links came from your address. Wait a minute.")
             if not self._journal.exists(terrain):
                 raise Denied("no_terrain", "There is no such terrain on this server.")
             raise Denied("bad_secret", "This link does not open this terrain. Ask for a new one.")
+        link, deleted = found
         if link.revoked is not None:
             raise Denied("revoked", "This link was revoked by the owner of the terrain.")
-        if (deleted := self._deletion.deleted(terrain)) is not None:
+        if deleted is not None:
             raise Deleted(link, deleted + GRACE_SECONDS)
         return link
 
@@ -60,6 +61,8 @@ class Door:
     def demand(self, link: Link) -> None:
         """Asks again whether a link still opens its terrain: after everything that was waited for, and before anything
         is given out or laid. Raises Denied (revoked, bad_secret)."""
+        if self._access.opens(link):
+            return
         if (deleted := self._deletion.deleted(link.terrain)) is not None:
             raise Deleted(link, deleted + GRACE_SECONDS)
         if not self._access.alive(link):
