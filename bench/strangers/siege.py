@@ -45,8 +45,8 @@ PERIOD: Final = 0.2
 SETTLED_SECONDS: Final = 20.0
 """Longer than this nobody waits for settled ground: then it counts as this."""
 SECONDS, RECOVERY_SECONDS = 15.0, 3.0
-"""In six seconds four people had a hundred acknowledgements: their 99th percentile was the second worst, and one wait for
-a disk that others use decided a row."""
+"""In six seconds four people had a hundred acknowledgements: their 99th percentile was the second worst of them, and a
+single wait for a disk that others use decided a row."""
 MINUTES: Final = 35.0
 """Within which it ends unless ``--minutes`` says otherwise; what there was no time for is listed."""
 ALL_SECONDS: Final = 45.0

@@ -80,6 +80,18 @@ def test_who_comes_waits_behind_those_who_wait() -> None:
     in_loop(run)
 
 
+def test_those_that_take_much_pay_for_what_others_wait() -> None:
+    """SPEC P661: beside threads that compute, a millisecond of the loop's own is five of everybody's."""
+
+    async def run() -> None:
+        share = LapShare(Laps())
+        share.take(LAP_SECONDS / 5, LAP_SECONDS)
+        assert share.left(is_small=False) == 0
+        assert share.left(is_small=True) == pytest.approx(LAP_SECONDS * (SMALL_LAPS - 0.2)), "people who draw do not"
+
+    in_loop(run)
+
+
 def test_who_left_is_not_called() -> None:
     async def run() -> None:
         share, came = LapShare(Laps()), list[str]()
@@ -102,7 +114,7 @@ def test_shares_are_freed_the_moment_that_nobody_holds_them() -> None:
         gc.disable()
         try:
             account = Accounts().member("192.0.2.1")
-            account.took(1.0)
+            account.took(1.0, 1.0)
             account.wait(lambda: None).cancel()
             await asyncio.sleep(2 * LAP_REST)
             share = account._crowd.lap
@@ -119,12 +131,12 @@ def test_tasks_wait_for_their_turn_and_do_not_all_begin_in_one_lap() -> None:
         accounts, begun = Accounts(), list[int]()
         each = [accounts.member("192.0.2.1") for _ in range(8)]
         for account in each:
-            account.took(0.002)
+            account.took(0.002, 0.002)
 
         async def work(number: int) -> None:
             await each[number].turn()
             begun.append(number)
-            each[number].took(0.002)
+            each[number].took(0.002, 0.002)
 
         tasks = [asyncio.create_task(work(number)) for number in range(8)]
         await asyncio.sleep(0)
@@ -152,7 +164,7 @@ def test_pages_that_have_just_come_do_not_all_begin_in_one_lap_either() -> None:
             begun.append(number)
 
         tasks = [asyncio.create_task(work(number)) for number in range(20)]
-        asyncio.get_running_loop().call_soon(accounts.member("192.0.2.1").took, 1.0)
+        asyncio.get_running_loop().call_soon(accounts.member("192.0.2.1").took, 1.0, 1.0)
         late = [asyncio.create_task(work(number)) for number in range(20, 40)]
         other = asyncio.create_task(accounts.member("192.0.2.2").turn())
         await asyncio.sleep(0)
@@ -173,7 +185,7 @@ def test_who_is_cancelled_in_the_lap_before_its_turn_is_passed_over() -> None:
         accounts, wrong = Accounts(), list[Any]()
         loop = asyncio.get_running_loop()
         loop.set_exception_handler(lambda _, context: wrong.append(context))
-        loop.call_soon(accounts.member("192.0.2.1").took, 1.0)
+        loop.call_soon(accounts.member("192.0.2.1").took, 1.0, 1.0)
         waiting = asyncio.create_task(accounts.member("192.0.2.1").turn())
         await asyncio.sleep(0)
         waiting.cancel()  # it hears of that in the next lap, after it was served

@@ -128,6 +128,9 @@ def test_requests_at_once_wait_for_each_other() -> None:
 def test_every_step_is_paid_however_it_ends() -> None:
     paid: list[float] = []
 
+    def step(seconds: float, _held: float) -> None:
+        paid.append(seconds)
+
     async def fails() -> None:
         await asyncio.sleep(0)
         raise ValueError("so it does")
@@ -139,10 +142,10 @@ def test_every_step_is_paid_however_it_ends() -> None:
             await asyncio.sleep(0)
 
     async def all_of_them() -> None:
-        await _Metered(asyncio.sleep(0), paid.append)
+        await _Metered(asyncio.sleep(0), step)
         with pytest.raises(ValueError, match="so it does"):
-            await _Metered(fails(), paid.append)
-        task = asyncio.ensure_future(_waits(_Metered(hangs(), paid.append)))
+            await _Metered(fails(), step)
+        task = asyncio.ensure_future(_waits(_Metered(hangs(), step)))
         await asyncio.sleep(0)
         task.cancel()
         with pytest.raises(asyncio.CancelledError):

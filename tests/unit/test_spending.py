@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from esker import contract as c
+from esker.fairness.laps import LAP_REST
 from esker.fairness.spending import (
     CALM_REST,
     DOUBT,
@@ -298,6 +299,28 @@ def test_a_long_read_is_worked_off_in_turns(monkeypatch: pytest.MonkeyPatch) -> 
         assert heard == [*(str(n) for n in range(40)), "102"], "in order, with what came meanwhile"
         assert not broke
         assert wire.transport.resume_reading.called
+        wire.server.connection_lost(None)
+
+    asyncio.run(run())
+
+
+def test_a_turn_of_who_takes_much_ends_with_what_others_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P661: its processor time alone would be a turn of 40 texts."""
+
+    async def run() -> None:
+        Clock(monkeypatch)
+        accounts = Accounts()
+        wire, heard, _ = await _member(accounts.member("a"))
+        wire.server._account.took(0.002, 0.002)
+        await asyncio.sleep(2 * LAP_REST)
+
+        def waits(text: str | bytes) -> None:
+            heard.append(text)
+            time.sleep(0.0015)  # another thread has the interpreter
+
+        wire.server.listen(waits)
+        wire.server.data_received(b"".join(text_frame(str(n)) for n in range(40)))
+        assert 0 < len(heard) <= 3
         wire.server.connection_lost(None)
 
     asyncio.run(run())

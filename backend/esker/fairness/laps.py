@@ -9,7 +9,8 @@ from collections.abc import Callable
 from typing import Final
 
 LAP_SECONDS: Final = 0.003
-"""Processor time that the connections of one address have in one lap: others wait for its end."""
+"""Seconds that the connections of one address have in one lap, whose end others wait for. Those that take little each
+time have them of processor time; for the rest it counts how long others wait: longer, beside threads that compute."""
 LAP_REST: Final = 0.006
 """After that they rest for so long, in which threads have what the loop leaves. Connections that take little each time
 only wait for the next lap: thirty people who draw behind one address are a quarter of a core."""
@@ -73,21 +74,22 @@ class _Taken:
 class LapShare:
     """What the connections of one address take of each lap. Lives in an event loop."""
 
-    __slots__ = ("_others", "_small", "_taken")
+    __slots__ = ("_held", "_others", "_small", "_taken")
 
     def __init__(self, laps: Laps) -> None:
-        self._taken = _Taken(laps)
+        self._taken, self._held = _Taken(laps), _Taken(laps)
         self._small = _Line(self._taken, LAP_SECONDS * SMALL_LAPS, 0.0)
-        self._others = _Line(self._taken, LAP_SECONDS, LAP_REST)
+        self._others = _Line(self._held, LAP_SECONDS, LAP_REST)
 
     def left(self, is_small: bool) -> float:
         """Returns the seconds of this lap that they still have. ``is_small``: for one that takes little each time."""
         line = self._line(is_small)
         return 0.0 if line.is_waiting else line.left()
 
-    def take(self, seconds: float) -> None:
-        """Notes that one of them took so long just now."""
+    def take(self, seconds: float, held: float = 0.0) -> None:
+        """Notes that one of them took so many seconds of processor time just now, and held the loop up for ``held``."""
         self._taken.take(seconds)
+        self._held.take(max(seconds, held))
 
     def wait(self, is_small: bool, call: Callable[[], None]) -> Waiting:
         """Calls ``call`` in a later lap, after those who wait already."""

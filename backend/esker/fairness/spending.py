@@ -144,11 +144,11 @@ class Account:
     def left(self) -> float:
         """Returns the seconds for which it may be read in this lap of the event loop, 0 where it has to wait in line.
         Called in an event loop, as is what follows."""
-        return self._crowd.lap.left(self._is_small)
+        return self._crowd.lap.left(self.is_small)
 
     def wait(self, call: Callable[[], None]) -> Waiting:
         """Calls ``call`` when it may be read, in a later lap."""
-        return self._crowd.lap.wait(self._is_small, call)
+        return self._crowd.lap.wait(self.is_small, call)
 
     async def turn(self) -> None:
         """Waits until it may be read."""
@@ -167,13 +167,16 @@ class Account:
         finally:
             waiting.cancel()
 
-    def took(self, seconds: float) -> None:
-        """Notes what reading it took, for those of its address that come after it."""
-        self._crowd.lap.take(seconds)
+    def took(self, seconds: float, held: float) -> None:
+        """Notes what reading it took, for those of its address that come after it: processor time, and for how long
+        others waited."""
+        self._crowd.lap.take(seconds, held)
         self._usual = max(seconds, self._usual + (seconds - self._usual) / 8)
 
     @property
-    def _is_small(self) -> bool:
+    def is_small(self) -> bool:
+        """Whether it takes little each time: its turns end by its processor time. Others' end by the time for which
+        everybody waits, which is longer beside threads that compute: many of one address would hold up a lap."""
         return self._own.share >= MUCH and self._usual <= CALM_SECONDS
 
     @property

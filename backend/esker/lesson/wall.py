@@ -152,10 +152,10 @@ class Walls:
                     del self._watched[lesson]
                     self.stale.pop(lesson, None)
 
-    def rest(self, who: Who, spent: float) -> float:
-        """Seconds that a wall rests for after it took ``spent`` seconds of the event loop."""
+    def rest(self, who: Who, held: float) -> float:
+        """Seconds that a wall rests for after it held up the event loop for ``held`` seconds."""
         mine = self.places.of("address", who.home)
-        return max(TURN_SECONDS, spent * max(MINE * mine, ALL * len(self.places)))
+        return max(TURN_SECONDS, held * max(MINE * mine, ALL * len(self.places)))
 
 
 class WallSession:
@@ -229,16 +229,16 @@ class WallSession:
         reader = asyncio.create_task(self._read_all(messages))
         try:
             while not reader.done():
-                now, began = time.monotonic(), time.thread_time()
+                now = time.monotonic()
                 self._hub.door.demand(link)
                 self._look(lesson.id, now)
                 for copy in list(self._copies.values()):
                     self._follow(copy, now)
                 self._wake(now)
                 wall = self._news(lesson.id)
-                spent = time.thread_time() - began
+                held = time.monotonic() - now  # beside threads that compute, questions to the database take most of it
                 await asyncio.wait_for(self._send(wall, now), c.STALL_SECONDS)
-                await asyncio.wait({reader}, timeout=self._walls.rest(self._who, spent))
+                await asyncio.wait({reader}, timeout=self._walls.rest(self._who, held))
             await reader
         finally:
             reader.cancel()

@@ -24,6 +24,9 @@ PATIENCE_SECONDS: Final = 10.0
 PAUSE_SECONDS: Final = 0.25
 """The longest pause between two parts of an answer."""
 _Pay = Callable[[float], None]
+_Step = Callable[[float, float], None]
+"""Hears of a step of the event loop: processor time, and how long others waited for its end. Requests of an address
+follow each other by the latter, which is several times as long beside threads that compute."""
 TOO_MUCH: Final = "Too much was asked for from your address. Wait a moment."
 
 
@@ -46,9 +49,9 @@ class Paced:
             for purse in purses:
                 purse.pay(now, seconds)
 
-        def step(seconds: float) -> None:  # of the event loop: threads that work for a request hold no other one up
+        def step(seconds: float, held: float) -> None:  # threads that work for a request hold no other one up
             nonlocal took
-            took += seconds
+            took += max(seconds, held)
             pay(seconds)
 
         pay(REQUEST_SECONDS)
@@ -64,7 +67,9 @@ class Paced:
         finally:
             pace.end(time.monotonic(), counted, took)
 
-    async def _run(self, scope: Any, receive: Any, send: Any, purses: tuple[Purse, ...], pay: _Pay, step: _Pay) -> None:
+    async def _run(
+        self, scope: Any, receive: Any, send: Any, purses: tuple[Purse, ...], pay: _Pay, step: _Step
+    ) -> None:
         async def paced(message: Any) -> None:
             await send(message)
             if message.get("more_body") and (behind := _debt(purses)) > 0:
@@ -83,22 +88,22 @@ def _debt(purses: tuple[Purse, ...]) -> float:
 
 
 class _Metered:
-    """Runs a coroutine and has each of its steps paid for by the processor time that this thread spent on it."""
+    """Runs a coroutine and tells what each of its steps took of this thread."""
 
-    def __init__(self, steps: Coroutine[Any, Any, None], pay: Callable[[float], None]) -> None:
-        self._steps, self._pay = steps, pay
+    def __init__(self, steps: Coroutine[Any, Any, None], step: _Step) -> None:
+        self._steps, self._step = steps, step
 
     def __await__(self) -> Generator[Any, Any, None]:
         steps = self._steps.__await__()
         value, error = None, None
         while True:
-            began = time.thread_time()
+            began, since = time.thread_time(), time.monotonic()
             try:
                 awaited = steps.send(value) if error is None else steps.throw(error)
             except StopIteration:
                 return
             finally:
-                self._pay(time.thread_time() - began)
+                self._step(time.thread_time() - began, time.monotonic() - since)
             value = error = None
             try:
                 value = yield awaited

@@ -195,11 +195,17 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             self.transport.pause_reading()
             self._turn = self._account.wait(self._go_on)
             return
-        began, at, spent = time.thread_time(), 0, 0.0
+        began, since, at = time.thread_time(), time.monotonic(), 0
+        is_small = self._account.is_small
+
+        def used() -> float:
+            spent = time.thread_time() - began
+            return spent if is_small else max(spent, time.monotonic() - since)
+
         is_strained = self._account.is_strained
         turn = min(left, STRAINED_TURN_SECONDS if is_strained else TURN_SECONDS)
-        while at < len(data) and spent < turn and not self._deaf and not self.disconnected:
-            taken = self._take_texts(data, at, began + turn)
+        while at < len(data) and used() < turn and not self._deaf and not self.disconnected:
+            taken = self._take_texts(data, at, used, turn)
             if not taken:
                 taken = min(SLICE_BYTES, len(data) - at)
                 piece = data[at : at + taken] if taken < len(data) else data
@@ -208,8 +214,8 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
                 if self.conn.handshake_exc is not None and not self.handshake_initiated:
                     self._refuse_handshake()
             at += taken
-            spent = time.thread_time() - began
-        self._account.took(spent)
+        spent = time.thread_time() - began
+        self._account.took(spent, time.monotonic() - since)
         self.pay(self._account.price(spent))
         if (at < len(data) or (is_strained and data)) and not self._deaf and not self.disconnected:
             self._rest = data[at:]
@@ -240,9 +246,8 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             return
         super().handle_cont(event)
 
-    def _take_texts(self, data: bytes, at: int, until: float) -> int:
-        """Gives the listener the texts that ``data`` has from ``at`` on, ``until`` the thread's time at which its turn
-        ends.
+    def _take_texts(self, data: bytes, at: int, used: Callable[[], float], turn: float) -> int:
+        """Gives the listener the texts that ``data`` has from ``at`` on, until more than ``turn`` seconds are used.
 
         Returns how many bytes they took. Clients say nearly everything in texts that are masked and in one frame each,
         and here these take a third of the time. What is anything else is left as it is.
@@ -263,7 +268,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             at = start + size
             assert self._listener is not None
             self._listener(text)
-            if time.thread_time() > until:
+            if used() > turn:
                 break
         return at - first
 

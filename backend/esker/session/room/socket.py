@@ -141,13 +141,13 @@ class Session:
         try:
             async for message in messages:
                 await self._account.turn()
-                began = time.thread_time()
+                began, since = time.thread_time(), time.monotonic()
                 events = self._events(message)
                 for event in events:
                     if not isinstance(event, protocol.Hi):
                         self._do(event)
                 spent = time.thread_time() - began
-                self._account.took(spent)
+                self._account.took(spent, time.monotonic() - since)
                 self._transport.pay(spent)
                 for event in events:
                     if isinstance(event, protocol.Hi):
