@@ -41,6 +41,9 @@ MOST_GONE: Final = 200
 TELL_SECONDS: Final = 0.25
 """Everybody is told how the lesson stands at most this often, the first time at once; conductors, who waits to be let
 in: a lesson may be switched, and who was removed may knock, hundreds of times a second."""
+KEEP_SECONDS: Final = 0.1
+"""How a lesson stands is written at most this often, the first time at once: a state of a hundred kilobytes in each
+commit would make everybody's strokes wait for it."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,8 @@ class Conducting:
         self._all = self._some = False
         """Whether everybody is to be told next, or conductors alone."""
         self._keeping = False
-        """Whether a state of the lesson is being written."""
+        """Whether a state of the lesson is being written, or waits for its time."""
+        self._kept_at = float("-inf")
         self._kept_late: list[Member] = []
         """Who switched since that was begun: the newest state is written after it, once."""
         self._is_newer = False
@@ -223,7 +227,15 @@ class Conducting:
         if self._keeping:
             self._is_newer = True
             return
-        self._keeping, self._is_newer = True, False
+        self._keeping = True
+        wait = self._kept_at + KEEP_SECONDS - self._loop.time()
+        if wait > 0:
+            self._loop.call_later(wait, self._write)
+        else:
+            self._write()
+
+    def _write(self) -> None:
+        self._is_newer, self._kept_at = False, self._loop.time()
         asked, self._kept_late = self._kept_late, []
         future = self._journal.keep_lesson(self._core.document.id, self._core.lesson.state.model_dump_json())
         future.add_done_callback(lambda done: self._loop.call_soon_threadsafe(self._kept, done, asked))
