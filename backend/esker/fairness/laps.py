@@ -11,7 +11,7 @@ from typing import Final
 LAP_SECONDS: Final = 0.003
 """Seconds that the connections of one address have in one lap, whose end others wait for. Those that take little each
 time have them of processor time; for the rest it counts how long others wait: longer, beside threads that compute."""
-LAP_REST: Final = 0.006
+LAP_REST: Final = 0.009
 """After that they rest for so long, in which threads have what the loop leaves. Connections that take little each time
 only wait for the next lap: thirty people who draw behind one address are a quarter of a core."""
 SMALL_LAPS: Final = 1.5
