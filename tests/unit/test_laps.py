@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from esker.fairness.laps import LAP_REST, LAP_SECONDS, SMALL_LAPS, Laps, LapShare
+from esker.fairness.laps import LAP_REST, LAP_SECONDS, SMALL_LAPS, WAITED, Laps, LapShare
 from esker.fairness.spending import Accounts
 
 
@@ -85,7 +85,7 @@ def test_those_that_take_much_pay_for_what_others_wait() -> None:
 
     async def run() -> None:
         share = LapShare(Laps())
-        share.take(LAP_SECONDS / 5, LAP_SECONDS)
+        share.take(LAP_SECONDS / 5, LAP_SECONDS / WAITED)
         assert share.left(is_small=False) == 0
         assert share.left(is_small=True) == pytest.approx(LAP_SECONDS * (SMALL_LAPS - 0.2)), "people who draw do not"
 

@@ -10,8 +10,11 @@ from typing import Final
 
 LAP_SECONDS: Final = 0.003
 """Seconds that the connections of one address have in one lap, whose end others wait for. Those that take little each
-time have them of processor time; for the rest it counts how long others wait: longer, beside threads that compute."""
-LAP_REST: Final = 0.009
+time have them of processor time; for the rest it counts as well how long others wait (``WAITED``)."""
+WAITED: Final = 0.5
+"""Beside threads that compute a lap takes several times its processor time. A second for which others wait counts like
+so many of processor time; not whole, as sixty people who draw faster than the processors follow would be read less."""
+LAP_REST: Final = 0.006
 """After that they rest for so long, in which threads have what the loop leaves. Connections that take little each time
 only wait for the next lap: thirty people who draw behind one address are a quarter of a core."""
 SMALL_LAPS: Final = 1.5
@@ -89,7 +92,7 @@ class LapShare:
     def take(self, seconds: float, held: float = 0.0) -> None:
         """Notes that one of them took so many seconds of processor time just now, and held the loop up for ``held``."""
         self._taken.take(seconds)
-        self._held.take(max(seconds, held))
+        self._held.take(max(seconds, WAITED * held))
 
     def wait(self, is_small: bool, call: Callable[[], None]) -> Waiting:
         """Calls ``call`` in a later lap, after those who wait already."""

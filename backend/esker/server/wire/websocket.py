@@ -17,7 +17,7 @@ from websockets.exceptions import WebSocketException
 from websockets.frames import CloseCode, Frame, Opcode
 from websockets.protocol import State
 
-from esker.fairness.laps import Waiting
+from esker.fairness.laps import WAITED, Waiting
 from esker.fairness.shares import Place
 from esker.fairness.spending import BYTE_SECONDS, Account
 from esker.server.wire.boundaries import FrameBoundaries
@@ -200,7 +200,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
 
         def used() -> float:
             spent = time.thread_time() - began
-            return spent if is_small else max(spent, time.monotonic() - since)
+            return spent if is_small else max(spent, WAITED * (time.monotonic() - since))
 
         is_strained = self._account.is_strained
         turn = min(left, STRAINED_TURN_SECONDS if is_strained else TURN_SECONDS)
