@@ -198,6 +198,24 @@ async function rendererFor(shot: Shot): Promise<SceneRenderer> {
   return made;
 }
 
+/** Pictures that were drawn on canvases of the device. */
+let drawnPictures = 0;
+const currentTexture = GPUCanvasContext.prototype.getCurrentTexture;
+GPUCanvasContext.prototype.getCurrentTexture = function (this: GPUCanvasContext): GPUTexture {
+  drawnPictures += 1;
+  return currentTexture.call(this);
+};
+
+/**
+ * Asks a renderer for a frame, and tells whether it drew one: where it skips, its figures are those of the last frame, and
+ * two frames may have the same figures. Taken for one, the last picture before the renderer rested was lost now and then.
+ */
+function drew(used: SceneRenderer, asked: Scene): { stats: FrameStats; isDrawn: boolean } {
+  const before = drawnPictures;
+  const stats = used.render(asked);
+  return { stats, isDrawn: drawnPictures !== before || used.kind === "map" };
+}
+
 /**
  * Draws a scene until the renderer rests; returns the last frame's figures with the number of frames. `drawn` is called in
  * the task that drew a frame: a WebGPU canvas keeps its picture only until that ends.
@@ -207,12 +225,9 @@ async function drawToRest(
   asked: Scene,
   drawn: () => void = () => {},
 ): Promise<FrameStats & { frames: number }> {
-  let cpuMs = -1;
   for (let frames = 1; ; frames += 1) {
-    const stats = used.render(asked);
-    // A frame that was skipped reports the figures of the last one.
-    if (stats.cpuMs !== cpuMs) drawn();
-    cpuMs = stats.cpuMs;
+    const { stats, isDrawn } = drew(used, asked);
+    if (isDrawn) drawn();
     await new Promise((done) => setTimeout(done, 16));
     if (!stats.busy && frames > 2) return { ...stats, frames };
     if (frames > 9000) throw new Error("the renderer never rests");
@@ -248,9 +263,8 @@ async function firstIn(shot: Shot, look: TerrainSettings["look"]): Promise<strin
   const used = await rendererFor(shot);
   const canvas = document.querySelector<HTMLCanvasElement>(`#${canvasOf(shot)}`)!;
   const changed = scene({ ...shot, settings: { ...shot.settings, look } }, shot.width ?? 1280, shot.height ?? 720);
-  // A frame that was skipped reports the figures of the last one.
-  const { cpuMs } = await shoot(shot);
-  while (used.render(changed).cpuMs === cpuMs) await new Promise((done) => setTimeout(done, 8));
+  await shoot(shot);
+  while (!drew(used, changed).isDrawn) await new Promise((done) => setTimeout(done, 8));
   return canvas.toDataURL("image/png");
 }
 
@@ -259,13 +273,10 @@ async function circle(shot: Shot, frames: number): Promise<{ ms: number; patches
   const used = await rendererFor(shot);
   const began = performance.now();
   let patches = 0;
-  let cpuMs = -1;
   for (let i = 0; i < frames; ) {
     const turned: Shot = { ...shot, eye: [shot.eye[0] + i * 3, shot.eye[1], shot.eye[2]] };
-    const stats = used.render(scene(turned, shot.width ?? 1280, shot.height ?? 720));
-    // A frame that was skipped reports the figures of the last one.
-    if (stats.cpuMs !== cpuMs) i += 1;
-    cpuMs = stats.cpuMs;
+    const { stats, isDrawn } = drew(used, scene(turned, shot.width ?? 1280, shot.height ?? 720));
+    if (isDrawn) i += 1;
     patches = stats.patches;
     await new Promise((done) => setTimeout(done, 8));
   }
