@@ -302,15 +302,16 @@ def test_a_token_opens_the_picture_and_nothing_else(server: LiveServer) -> None:
         assert server.http("GET", f"/api/terrains/{terrain}{path}", secret=token)[0] in (401, 403)
 
 
-@pytest.mark.usefixtures("server")
-def test_a_server_that_shall_not_draw_shows_none(tmp_path: Path) -> None:
+def test_a_server_that_shall_not_draw_shows_none(server: LiveServer, tmp_path: Path) -> None:
     """V20."""
-    with LiveServer(tmp_path / "silent", previews=False) as silent:
+    with LiveServer(tmp_path / "silent", previews=False, page=server.assembly.settings.page) as silent:
         terrain, secret = silent.create()
         status, answer = silent.http("GET", f"/api/terrains/{terrain}/preview", secret=secret)
         assert (status, answer["shown"], answer["available"]) == (200, True, False)
         assert silent.raw("GET", f"/preview/{answer['token']}.jpg")[0] == 404
-        assert "og:" not in silent.raw("GET", f"/t/{terrain}?p={answer['token']}")[1].decode()
+        page = silent.raw("GET", f"/t/{terrain}?p={answer['token']}")[1].decode()
+        assert "</html>" in page
+        assert "og:" not in page
 
 
 def test_the_page_names_the_picture(server: LiveServer) -> None:

@@ -21,6 +21,7 @@ from esker.fairness.shares import Full, Rate, Rates, Share, Who
 from esker.fairness.turns import SERVER, FairThreads, Turns
 from esker.lesson import classes, collect, merge, wall
 from esker.session import births
+from esker.store.access import Link
 from esker.store.classes import forget_empty
 from esker.store.journal import Journal
 from tests.sync.harness import PATIENCE, LiveServer
@@ -283,6 +284,33 @@ def test_walls_rest_by_what_they_took(server: LiveServer) -> None:
         assert len(here) * 0.02 / (0.02 + walls.rest(here[0], 0.02)) <= 1 / wall.MINE
     with walls.watching("c", here[0]):
         assert walls.rest(here[0], 0.0001) == wall.TURN_SECONDS
+
+
+def test_walls_rest_by_how_long_they_held_the_loop_up(
+    server: LiveServer, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC P539: a question to the database takes little processor time, and long beside threads that compute."""
+    rests: list[float] = []
+    door, rest = server.assembly.hub.door, wall.Walls.rest
+    demand = door.demand
+
+    def slow(link: Link) -> None:
+        time.sleep(0.03)
+        demand(link)
+
+    def noted(self: wall.Walls, who: Who, held: float) -> float:
+        rests.append(held)
+        return rest(self, who, held)
+
+    monkeypatch.setattr(door, "demand", slow)
+    monkeypatch.setattr(wall.Walls, "rest", noted)
+    shown = _wall(teacher)
+    deadline = time.monotonic() + PATIENCE
+    while not rests:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    assert min(rests) >= 0.03
+    shown.ws.close()
 
 
 def test_a_copy_that_a_wall_had_opened_sleeps_when_the_wall_goes(server: LiveServer, teacher: Teacher) -> None:

@@ -129,6 +129,19 @@ def test_nobody_ends_the_link_that_one_s_own_came_from(live: LiveServer) -> None
     revoke(live, terrain, owner, second_id)
 
 
+def test_who_comes_is_looked_up_by_one_question_at_a_time(live: LiveServer) -> None:
+    """SPEC P662."""
+    terrain, secret = live.create()
+    hub = live.assembly.hub
+    link = hub.door.authorise(terrain, secret, "192.0.2.7")
+    asked: list[str] = []
+    hub.journal.reader().set_trace_callback(asked.append)  # type: ignore[attr-defined]
+    assert hub.door.authorise(terrain, secret, "192.0.2.7") == link
+    assert len(asked) == 1
+    hub.door.demand(link)
+    assert len(asked) == 2
+
+
 def test_authority_is_asked_in_the_commit_itself(store: Store) -> None:
     """SPEC P287: what was asked before a revocation and is written after it is not done."""
     journal = store.open()

@@ -93,6 +93,20 @@ def test_requests_of_who_asks_for_much_come_one_after_another(monkeypatch: pytes
     assert len(waits) == 5
 
 
+def test_requests_follow_each_other_by_how_long_they_held_the_loop_up() -> None:
+    """SPEC P644: beside threads that compute, most of it is no processor time. Nobody pays for that."""
+
+    async def held(scope: Any, receive: Any, send: Any) -> None:
+        time.sleep(0.1)
+        await _app(scope, receive, send)
+
+    paced = Paced(held)
+    (purse,) = paced._accounts.asker("192.0.2.7")
+    assert _status(paced, "192.0.2.7") == 200
+    assert paced._accounts.pace("192.0.2.7").begin(time.monotonic())[0] > 0.09 / PACE.per_second
+    assert purse.share > MUCH
+
+
 def test_what_threads_do_for_a_request_and_whoever_is_refused_hold_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC P644: the pace is one of the event loop. A teacher's export of a minute is no reason for pupils to wait."""
 

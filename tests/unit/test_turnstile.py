@@ -46,6 +46,19 @@ def test_pieces_follow_each_other_in_turns_of_addresses_with_rests() -> None:
     assert all(after - before >= 0.008 for (_, _, before), (_, after, _) in pairwise(done)), "others have as long"
 
 
+def test_a_rest_is_as_long_as_others_waited() -> None:
+    """SPEC P648: beside threads that compute, most of it is no processor time."""
+
+    async def run() -> float:
+        turnstile = Turnstile()
+        await turnstile.run(HERE, time.sleep, 0.05)
+        began = time.monotonic()
+        await turnstile.run(THERE, lambda: None)
+        return time.monotonic() - began
+
+    assert asyncio.run(run()) >= 0.04
+
+
 def test_what_fails_or_is_left_holds_nobody_up() -> None:
     async def run() -> None:
         turnstile = Turnstile()
