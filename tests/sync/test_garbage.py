@@ -1,9 +1,11 @@
-"""SPEC S595, S596: what is large is freed when nobody holds it, and the collector keeps nobody waiting."""
+"""SPEC S595 to S597: what is large is freed when nobody holds it, and the collector keeps nobody waiting."""
 
 from __future__ import annotations
 
 import asyncio
 import gc
+import subprocess
+import sys
 import time
 import weakref
 from collections.abc import Callable, Iterator
@@ -12,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from esker.process.garbage import DUE, OVERDUE, Collector, weakly
+from esker.process.garbage import DUE, OVERDUE, Collector, importing, weakly
 from esker.tiles.decoder import FrameDecoder
 from tests.sync.harness import PATIENCE, LiveServer, stroke
 from tests.sync.test_refined import NEAR, RoofSolver, follow
@@ -159,3 +161,54 @@ def test_a_server_leaves_the_collector_as_it_was(tmp_path: Path) -> None:
     with LiveServer(tmp_path):
         assert gc.get_threshold() != before[0]
     assert (gc.get_threshold(), list(gc.callbacks)) == before
+
+
+def test_what_is_imported_is_set_aside_and_not_looked_through_meanwhile() -> None:
+    """SPEC S597: of importing the server a sixth was looking through what it makes, which stays."""
+    gc.unfreeze()
+    looks: list[str] = []
+
+    def looked(phase: str, info: dict[str, int]) -> None:
+        looks.append(phase)
+
+    gc.callbacks.append(looked)
+    try:
+        with importing():
+            there = in_circles(20_000)
+            assert looks == []
+        assert gc.get_freeze_count() >= len(there)
+        assert gc.isenabled()
+    finally:
+        gc.callbacks.remove(looked)
+        gc.unfreeze()
+    gc.disable()
+    try:
+        with importing():
+            pass
+        assert not gc.isenabled(), "whoever has put the collector off has it put off afterwards"
+    finally:
+        gc.enable()
+        gc.unfreeze()
+
+
+WATCHED = """
+import gc, os, sys
+
+class Watch:
+    def find_spec(self, name, path=None, target=None):
+        if name == "esker.server.run":
+            sys.stderr.write(f"enabled: {gc.isenabled()}")
+            sys.stderr.flush()
+            os._exit(0)
+
+sys.meta_path.insert(0, Watch())
+from esker.cli.main import main
+main(["serve", "--port", "0", "--data", sys.argv[1]])
+"""
+
+
+def test_the_command_imports_the_server_so(tmp_path: Path) -> None:
+    """SPEC S597."""
+    command = [sys.executable, "-c", WATCHED, str(tmp_path / "data")]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True)
+    assert ran.stderr.endswith("enabled: False")

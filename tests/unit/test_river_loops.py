@@ -41,6 +41,22 @@ def test_they_are_compiled_once_and_those_of_tiles_apart(children: list[list[str
     assert begun.is_set()
 
 
+def test_where_no_process_can_be_had_the_thread_goes_on(
+    children: list[list[str]], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """SPEC H573: a limit of processes was reached while a server started: it looked for no rivers from then on."""
+
+    def none(arguments: list[str], **more: object) -> dict[str, object]:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    with monkeypatch.context() as limited:
+        limited.setattr(prepare, "bounded", none)
+        first_build.have_river_loops(threading.Event())
+    assert "no process compiles them" in caplog.text
+    first_build.have_river_loops(threading.Event())
+    assert children == [["loops", "rivers"]], "it is tried again at the next start"
+
+
 def test_what_was_stopped_is_compiled_the_next_time(children: list[list[str]]) -> None:
     stopped = threading.Event()
     stopped.set()

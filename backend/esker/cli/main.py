@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from esker import contract as c
 from esker import resources
-from esker.process import caches, system
+from esker.process import caches, garbage, system
 from esker.version import VERSION
 
 if TYPE_CHECKING:
@@ -123,7 +123,8 @@ def _serve(parsed: argparse.Namespace) -> int:
         system.on_stop(stopping)
         door = starting.FrontDoor(settings)
         with starting.WaitingRoom(door.listener, door.context, sys.stdout) as room:
-            from esker.server.run import serve  # this import takes a second, in which the door already listens
+            with garbage.importing():
+                from esker.server.run import serve  # this takes a second, in which the door already listens
 
             serve(settings, door, room, stopping)
     except BaseException as error:
@@ -179,7 +180,9 @@ def _base_of(document: c.Document, data: bytes) -> Base | None:
 def _run(module: str, argv: list[str], *more: object) -> int:
     if importlib.util.find_spec(module) is None:
         return _fail(f"This installation lacks {module}.")
-    result: int = importlib.import_module(module).main(argv, *more)
+    with garbage.importing():
+        command = importlib.import_module(module)
+    result: int = command.main(argv, *more)
     return result
 
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final, ParamSpec, TypeVar
 from weakref import WeakMethod
 
@@ -41,6 +42,20 @@ def weakly(method: Callable[P, T]) -> Callable[P, T | None]:
         return None if found is None else found(*args, **kwargs)
 
     return call
+
+
+@contextmanager
+def importing() -> Iterator[None]:
+    """Lets modules be imported without looks of the collector: all that they make stays, and each look goes through
+    all of it. That is a sixth of what importing the server takes. What was made is set aside."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        if enabled:
+            gc.enable()
 
 
 class Collector:

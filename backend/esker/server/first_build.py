@@ -219,6 +219,8 @@ def _compiled(what: str, stopped: threading.Event, begins: Callable[[], None]) -
                 record.touch()
     except prepare.Stopped:
         return False
+    except OSError as error:  # no process can be had: whatever thread asks goes on without
+        log.warning("loops of %s: no process compiles them (%s); the server compiles what is missing", what, error)
     return True
 
 
