@@ -21,10 +21,13 @@ from esker.fairness.shares import Full, Rate, Rates, Share, Who
 from esker.fairness.turns import SERVER, FairThreads, Turns
 from esker.lesson import classes, collect, merge, wall
 from esker.session import births
+from esker.session.ground.client import Client
+from esker.session.ground.jobs import Job
+from esker.session.ground.worker import Worker
 from esker.store.access import Link
 from esker.store.classes import forget_empty
 from esker.store.journal import Journal
-from tests.sync.harness import PATIENCE, LiveServer
+from tests.sync.harness import PATIENCE, LiveServer, stroke
 from tests.sync.test_classes import Pupil, Teacher
 from tests.sync.test_wall import Wall
 
@@ -123,9 +126,9 @@ def test_orders_to_all_copies_have_turns_by_address(
     asked: list[Who] = []
     room = made.hub.room
 
-    async def opened(terrain: str, who: Who = SERVER) -> Any:
+    async def opened(terrain: str, who: Who = SERVER, **more: bool) -> Any:
         asked.append(who)
-        return await room(terrain, who)
+        return await room(terrain, who, **more)
 
     monkeypatch.setattr(made.hub, "room", opened)
     assert teacher.ask("restart")[0] == 200
@@ -144,6 +147,32 @@ def test_orders_to_all_copies_have_turns_by_address(
     assert server.http("POST", f"/api/terrains/{teacher.terrain}/classes", {}, teacher.secret)[0] == 429
 
 
+def test_what_is_written_where_nobody_looks_is_solved_when_somebody_does(
+    server: LiveServer, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC P663: an order to sixty copies had each of them solved, for nobody, beside everybody who drew."""
+    ada, ben = Pupil(teacher, "Ada"), Pupil(teacher, "Ben")
+    asked: list[int] = []
+    request = Worker.request
+
+    def noted(worker: Worker, client: Client, job: Job) -> None:
+        asked.append(len(job.strokes))
+        request(worker, client, job)
+
+    own = server.join(teacher.terrain, teacher.secret, "t")
+    own.ops(("t:1", stroke("s1")), ("t:2", {"type": "stroke.finish", "stroke": "s1"}))
+    own.wait("ack")
+    with_ben = ben.join("ben1")
+    with_ben.settled(0)
+    monkeypatch.setattr(Worker, "request", noted)
+    assert teacher.ask("push") == (200, {"changed": 2})
+    with_ben.at_rest(1)
+    assert asked == [1], "Ben looks, nobody else does"
+    with_ada = ada.join("ada1")
+    with_ada.at_rest(1)
+    assert asked == [1, 1]
+
+
 def test_copies_are_put_together_one_after_another() -> None:
     """SPEC P533: as soon as they are too many it ends; none is held that is not in it."""
     start = _document("start")
@@ -155,9 +184,9 @@ def test_copies_are_put_together_one_after_another() -> None:
 
     def different() -> Iterator[c.Stroke]:
         nonlocal looked
-        for stroke in _document("c", c.MAX_STROKES).strokes:
+        for each in _document("c", c.MAX_STROKES).strokes:
             looked += 1
-            yield stroke.model_copy(update={"last": (8.0, 0.0, 0.0)})
+            yield each.model_copy(update={"last": (8.0, 0.0, 0.0)})
 
     with pytest.raises(Refusal):
         made.add(different())

@@ -321,7 +321,7 @@ class Classes:
             if self.hub.deletion.deleted(copy.terrain) is not None:
                 continue
             try:
-                room = await self.hub.room(copy.terrain, who)
+                room = await self.hub.room(copy.terrain, who, shown=False)
                 ops = await self._planned(room, plan, who)
                 for op in merge.groups(ops):
                     agent = f"class-{secrets.token_urlsafe(9)}"

@@ -79,10 +79,12 @@ class Room(ClassRoom):
         tenancy: Tenancy | None = None,
         meter: Meter | None = None,
         on_lost: Callable[[], None] = lambda: None,
+        shown: bool = True,
     ) -> None:
         """``elevation`` makes the base of the layers, in a thread of ``base_threads``; without them nothing is laid.
         ``desk``: what a lesson asks of the server; ``home``: the address of who opened it, for whom its work is done
-        until somebody comes who draws. ``on_lost``: what is in the journal is known no longer."""
+        until somebody comes who draws. ``on_lost``: what is in the journal is known no longer. ``shown``: whether
+        somebody is to see its ground (``show``); without, nothing of it is solved."""
         self.core, self.info = core, info
         self.id = core.document.id
         self._journal, self._worker, self._on_empty = journal, worker, on_empty
@@ -127,6 +129,7 @@ class Room(ClassRoom):
         self._tick_at = float("-inf")
         self._presence_timer: asyncio.TimerHandle | None = None
         self._solve_due = False
+        self._shown = shown
         self._requested_clock = -1
         self._called: dict[str, Person] = {}
         """Authors of ops as the journal knows them."""
@@ -361,12 +364,20 @@ class Room(ClassRoom):
 
     # --- the ground ---------------------------------------------------------------------------------------------
 
+    def show(self) -> None:
+        """Somebody is to see the ground, which is solved from now on."""
+        if not self._shown:
+            self._shown = True
+            self._request_solve()
+
     def _solve(self) -> None:
         self._solve_due = False
         if self.core.geometry_clock > self._requested_clock:
             self._request_solve()
 
     def _request_solve(self) -> None:
+        if not self._shown:
+            return
         head = self.core.head
         self._requested_clock = head.clock
         fresh = self._layers.want(head)
