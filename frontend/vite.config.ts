@@ -14,7 +14,8 @@ export default defineConfig({
   build: { target: "es2023", outDir: "dist", assetsInlineLimit: 0, chunkSizeWarningLimit: 1500 },
   worker: { format: "es" },
   // Limits end what hangs. A busy machine takes its time. Files that show components or put something in place of modules
-  // have a world each; the others share one, which takes a third less processor time in all.
+  // have a world each; the others share one, for a seventh less
+  // processor time in all.
   test: {
     pool: "threads",
     testTimeout: 300_000,

@@ -157,21 +157,21 @@ class Hub:
             raise Denied("rate_limited", "Too much was asked for from your address at once. Wait a moment.") from None
 
     async def room(self, terrain: str, who: Who = SERVER, *, shown: bool = True) -> Room:
-        """Returns the open room of a terrain. ``shown``: whether somebody is to see its ground, or only writes there.
+        """Returns the open room of a terrain. ``shown``: whether somebody is to see its ground, or only to write there.
 
         Raises Denied (no_terrain, server_error, rate_limited)."""
-        room = await self._room(terrain, who, shown)
+        room = await self._room(terrain, who)
         while room.closed:  # the room was idle and closed in this very moment
-            room = await self._room(terrain, who, shown)
-        if shown:
+            room = await self._room(terrain, who)
+        if shown:  # whoever comes waits for it, so it begins before they are let in
             room.show()
         return room
 
-    async def _room(self, terrain: str, who: Who, shown: bool) -> Room:
+    async def _room(self, terrain: str, who: Who) -> Room:
         task = self._rooms.get(terrain)
         if task is None:
             self._places.take(terrain, who)
-            task = self._rooms[terrain] = asyncio.create_task(self._open(terrain, who, shown))
+            task = self._rooms[terrain] = asyncio.create_task(self._open(terrain, who))
         self._places.used(terrain)
         try:
             room = await asyncio.shield(task)
@@ -193,7 +193,7 @@ class Hub:
             del self._rooms[terrain]
             self._places.release(terrain)
 
-    async def _open(self, terrain: str, who: Who, shown: bool) -> Room | None:
+    async def _open(self, terrain: str, who: Who) -> Room | None:
         if self._tenancy is not None:
             try:
                 await self._tenancy.hold(terrain)
@@ -215,7 +215,7 @@ class Hub:
         )
         desk = Desk(self.read, partial(self._end_code_link, terrain))
         more = {"tenancy": self._tenancy, "on_lost": lambda: self.lose(terrain)}
-        needs = self._needs() | {"desk": desk, "home": who.site, "shown": shown} | more
+        needs = self._needs() | {"desk": desk, "home": who.site} | more
         room = Room(core, journal=self.journal, on_empty=lambda _: self._empty(terrain), **needs)
         room.in_class = self.class_of(terrain)
         return room

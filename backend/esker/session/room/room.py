@@ -79,12 +79,11 @@ class Room(ClassRoom):
         tenancy: Tenancy | None = None,
         meter: Meter | None = None,
         on_lost: Callable[[], None] = lambda: None,
-        shown: bool = True,
     ) -> None:
         """``elevation`` makes the base of the layers, in a thread of ``base_threads``; without them nothing is laid.
         ``desk``: what a lesson asks of the server; ``home``: the address of who opened it, for whom its work is done
-        until somebody comes who draws. ``on_lost``: what is in the journal is known no longer. ``shown``: whether
-        somebody is to see its ground (``show``); without, nothing of it is solved."""
+        until somebody comes who draws. ``on_lost``: what is in the journal is known no longer. Nothing
+        is solved until somebody is to see its ground (``show``)."""
         self.core, self.info = core, info
         self.id = core.document.id
         self._journal, self._worker, self._on_empty = journal, worker, on_empty
@@ -129,7 +128,7 @@ class Room(ClassRoom):
         self._tick_at = float("-inf")
         self._presence_timer: asyncio.TimerHandle | None = None
         self._solve_due = False
-        self._shown = shown
+        self._shown = False
         self._requested_clock = -1
         self._called: dict[str, Person] = {}
         """Authors of ops as the journal knows them."""
@@ -153,7 +152,6 @@ class Room(ClassRoom):
         """The time at which somebody came, or did more than to answer by itself."""
         self._rivers.follow(core.head)
         self.scoring.follow(core.head)
-        self._request_solve()
 
     # --- people -------------------------------------------------------------------------------------------------
 
@@ -182,6 +180,7 @@ class Room(ClassRoom):
         if self.scoring.newest is not None:
             outbox.message(self.scoring.newest)
         self._works_for(member)
+        self.show()
         guest = Guest(member, self._feed.add(outbox))
         self.conducting.joined(member)
         self._active_at = self._loop.time()
