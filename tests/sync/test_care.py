@@ -106,10 +106,10 @@ def test_a_long_log_is_cut_when_it_is_begun_anew(journal: Journal, tmp_path: Pat
     """SPEC J394: one large commit does not leave the disk as full as it was."""
     log = tmp_path / f"{DATABASE_NAME}-wal"
     big = "x" * 1_000_000
-    rows = [Row(k, "c", k, "c", big) for k in range(1, 13)]
+    rows = [Row(k, "c", k, "c", big) for k in range(1, 21)]
     journal.append("u", rows).result()
     assert log.stat().st_size > 2 * LOG_BYTES
-    for k in range(13, 16):
+    for k in range(21, 24):
         journal.append("u", [Row(k, "c", k, "c", "x")]).result()
     assert log.stat().st_size <= LOG_BYTES
 

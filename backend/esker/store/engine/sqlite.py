@@ -17,6 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
+from esker.store.engine.checkpoints import WRITERS_PAGES, Checkpoints
 from esker.store.engine.ports import Connection, Unwritable, UsedTwice
 from esker.store.engine.writer import write_all
 from esker.store.space import NoSpace, Space
@@ -27,9 +28,9 @@ from esker.store.upkeep.inspection import DATABASE_NAME, check
 T = TypeVar("T")
 Item = tuple[Callable[[sqlite3.Connection], Any], "Future[Any]"]
 
-LOG_BYTES: Final = 5 << 20
-"""How long the write-ahead log is from the start: more than the 1,000 pages after which it is begun anew. One that a
-large commit made longer is cut to this when it is begun anew."""
+LOG_BYTES: Final = 9 << 20
+"""How long the write-ahead log is from the start: more than the ``WRITERS_PAGES`` after which it is begun anew at the
+latest. One that a large commit made longer is cut to this then."""
 
 
 class Sqlite:
@@ -45,6 +46,8 @@ class Sqlite:
             migrations.migrate(self.writer_db, lambda old: keep_copy(self.path, directory, f"format-{old}", now))
             if new:
                 migrations.state(self.writer_db, "swept_from", str(now + migrations.SWEEP_AFTER))
+            self.writer_db.execute(f"PRAGMA wal_autocheckpoint={WRITERS_PAGES}")
+            self._checkpoints = Checkpoints(connect(self.path))
         lengthen(directory / f"{DATABASE_NAME}-wal")
         self._readers = threading.local()
         self._open_readers: list[sqlite3.Connection] = []
@@ -99,6 +102,7 @@ class Sqlite:
                 self.writable = False
             elif db.total_changes > changes:
                 self.writable = True
+                self._checkpoints.committed()
         except sqlite3.Error as error:  # nothing of this batch is durable
             if db.in_transaction:
                 db.execute("ROLLBACK")
@@ -150,6 +154,7 @@ class Sqlite:
         self._closed = True
         self._queue.put(None)
         self._thread.join()
+        self._checkpoints.close()
         for db in self._open_readers:
             db.close()
         self.writer_db.close()
