@@ -173,6 +173,37 @@ def test_what_is_written_where_nobody_looks_is_solved_when_somebody_does(
     assert asked == [1, 1]
 
 
+def test_a_room_is_attended_from_the_first_who_comes_to_the_last_who_leaves(
+    server: LiveServer, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC P664: a copy that is collected is nobody's to wait for."""
+    told: list[bool] = []
+    attend = Worker.attend
+
+    def noted(worker: Worker, client: Client, by_somebody: bool) -> None:
+        told.append(by_somebody)
+        attend(worker, client, by_somebody)
+
+    ada = Pupil(teacher, "Ada")
+    monkeypatch.setattr(Worker, "attend", noted)
+    status, begun = teacher.ask("collections")
+    assert status == 202
+    while server.http("GET", f"{teacher.path}/collections/{begun['id']}", secret=teacher.secret)[1]["stage"] != "done":
+        time.sleep(0.02)
+    assert set(told) == {False}, "Ada is not there yet"
+    told.clear()
+    first, second = ada.join("ada1"), ada.join("ada2")
+    second.settled(0)
+    assert told == [False, True, True]
+    first.close()
+    second.close()
+    deadline = time.monotonic() + PATIENCE
+    while told[-1] and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert told == [False, True, True, False]
+    assert server.http("DELETE", teacher.path, secret=teacher.secret)[0] == 200, "others collect on this server, too"
+
+
 def test_copies_are_put_together_one_after_another() -> None:
     """SPEC P533: as soon as they are too many it ends; none is held that is not in it."""
     start = _document("start")

@@ -16,6 +16,7 @@ from esker.events import PAUSE, BaseLevel, Preview, Settled, SolveEvent
 from esker.session.ground.client import Client
 from esker.session.ground.jobs import Job
 from esker.session.ground.schedule import AHEAD
+from esker.session.ground.tally import UNATTENDED_PRICE
 from esker.session.ground.worker import Worker
 
 SETTINGS = c.TerrainSettings()
@@ -198,6 +199,49 @@ def test_a_room_is_of_whoever_draws_in_it() -> None:
     for room in many:
         world.worker.remove(room)
     assert set(world.worker._tally.homes) == {"198.51.100.1"}
+
+
+def test_rooms_that_nobody_is_in_come_behind_who_draws() -> None:
+    """SPEC P664: a class that was collected had half of the solver beside whoever drew elsewhere."""
+    world = World()
+    drawn, collected = world.room("drawn", "198.51.100.1"), world.room("collected", "203.0.113.7")
+    world.worker.attend(collected, False)
+    world.churning += [(drawn, 0.01, 0.0), (collected, 0.01, 0.0)]
+    world.run(20.0)
+    assert abs(world.slices[drawn] - UNATTENDED_PRICE * world.slices[collected]) < 2 * AHEAD
+    world.worker.move(collected, "203.0.113.8")
+    world.slices.clear()
+    world.run(20.0)
+    assert world.slices[collected] < 0.3 * world.slices[drawn], "also where it is of somebody else"
+    world.worker.attend(collected, True)
+    world.slices.clear()
+    world.run(20.0)
+    assert abs(world.slices[drawn] - world.slices[collected]) < 2 * AHEAD, "until somebody comes"
+
+
+def test_a_room_that_nobody_is_in_takes_little_from_its_own_address() -> None:
+    """SPEC P664: a teacher draws while the class is collected, both from one address."""
+    world = World()
+    other, drawn, collected = (world.room(name, name[0]) for name in ("a", "b drawn", "b collected"))
+    world.worker.attend(collected, False)
+    world.churning += [(room, 0.01, 0.0) for room in (other, drawn, collected)]
+    world.run(20.0)
+    assert abs(world.slices[drawn] - UNATTENDED_PRICE * world.slices[collected]) < 2 * AHEAD
+    assert world.slices[drawn] > 0.7 * world.slices[other]
+
+
+def test_a_room_that_nobody_is_in_has_all_that_nobody_else_wants() -> None:
+    """SPEC P664."""
+    world = World()
+    drawn, collected = world.room("drawn"), world.room("collected")
+    world.worker.attend(collected, False)
+    world.ask(drawn, 0.01)
+    world.run(2.0)
+    asked = world.now
+    world.ask(collected, 0.01)
+    world.run(2.0)
+    [settled] = world.settled["collected"]
+    assert settled - asked < (CYCLES + 2 * LEVELS + 2) * 0.01
 
 
 def test_time_that_nobody_wanted_is_held_against_nobody_and_not_saved_up() -> None:

@@ -107,7 +107,9 @@ class Bench:
                 self._arrived.notify()
 
         def confirm(clock: int, level: int) -> None:
-            self.confirmed.append((clock, level))
+            with self._arrived:
+                self.confirmed.append((clock, level))
+                self._arrived.notify()
 
         return self.worker.add(levels, deliver, _unexpected, confirm=confirm, note=deliver)
 
@@ -119,6 +121,11 @@ class Bench:
         with self._arrived:
             assert self._arrived.wait_for(lambda: len(self.got) >= goal, 60), self.got
         return self.got
+
+    def confirms(self, clock: int, level: int) -> None:
+        """Waits until the newest confirmation is this one: it follows the state in which nothing is to be done."""
+        with self._arrived:
+            assert self._arrived.wait_for(lambda: self.confirmed[-1:] == [(clock, level)], 60), self.confirmed
 
     def idle(self) -> None:
         """Waits until the worker stands at the turnstile or has nothing to do."""
@@ -211,8 +218,7 @@ def test_paint_leaves_settled_heights_alone() -> None:
         for clock in (2, 3):
             bench.worker.request(room, _job(clock, -1))
             assert bench.let(1)[-1] == ("a.snow", clock, 0, True)
-            bench.idle()
-            assert bench.confirmed[-1] == (clock, 2)
+            bench.confirms(clock, 2)
         bench.worker.request(room, _job(4, -2))
         assert bench.let(1)[-1] == ("a", 4, 0, False)
 
@@ -238,8 +244,8 @@ def test_paint_does_not_stop_heights_that_settle() -> None:
         assert bench.let(1)[-1] == ("a", 1, 2, True)
         assert bench.confirmed == []
         assert bench.let(1)[-1] == ("a.snow", 4, 0, True)
-        bench.idle()
-        assert bench.confirmed == [(4, 2)]
+        bench.confirms(4, 2)
+        assert len(bench.confirmed) == 1
 
     _bench(run)
 

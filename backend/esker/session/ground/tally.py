@@ -3,7 +3,8 @@
 A home is the address that a room's work is done for: of who opened it, then of who draws. Homes that are busy have
 about as much time as each other, and so have the rooms of one home among themselves. So whoever opens sixty rooms has
 no more than whoever has two: a home with several busy rooms counts as two, since a class sits behind one address. A
-room without a home is one by itself.
+room without a home is one by itself. What is done for a room that nobody is in counts several times, for the room and
+for its home: a class is collected behind those who draw.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from typing import Any, Final, Generic, TypeVar
 PATIENCE: Final = 0.150
 HOME_ROOMS: Final = 2
 """A home with so many busy rooms or more has so many times what a home with one has."""
+UNATTENDED_PRICE: Final = 4.0
+"""What is done for a room that nobody is in counts so many times: beside somebody who draws it has a fifth."""
 
 Room = TypeVar("Room", bound=Hashable)
 
@@ -24,12 +27,13 @@ Room = TypeVar("Room", bound=Hashable)
 class Time:
     """Time that was used. seconds: how long, when it is compared with that of others that are busy. is_busy: whether
     there was something to do when the tally was last levelled. is_coarsest: whether the last slice was for a coarsest
-    preview; coarsest_s: what the last such one took."""
+    preview; coarsest_s: what the last such one took. price: what a second of it counts."""
 
     seconds: float = 0.0
     is_busy: bool = False
     is_coarsest: bool = False
     coarsest_s: float = 0.0
+    price: float = 1.0
 
     def levelled(self, is_busy: bool, least: float) -> Time:
         """The time of who is busy, or is not: who comes begins with the least of those who were."""
@@ -39,7 +43,7 @@ class Time:
     def ended(self, took: float) -> Time:
         """The time after a slice."""
         coarsest_s = took if self.is_coarsest else self.coarsest_s
-        return replace(self, seconds=self.seconds + took, coarsest_s=coarsest_s)
+        return replace(self, seconds=self.seconds + took * self.price, coarsest_s=coarsest_s)
 
 
 @dataclass(frozen=True)
@@ -124,14 +128,19 @@ class Tally(Generic[Room]):
             return tally
         return replace(tally, homes={other: had for other, had in tally.homes.items() if other != key})
 
+    def attended(self, room: Room, by_somebody: bool) -> Tally[Room]:
+        """Returns the tally from when somebody is in a room on, or nobody."""
+        had = self.rooms.get(room)
+        price = 1.0 if by_somebody else UNATTENDED_PRICE
+        return self if had is None else self.noted(room, time=replace(had.time, price=price))
+
     def moved(self, room: Room, home: Hashable) -> Tally[Room]:
         """From now on a room's work is done for another home. Among the rooms there it begins as who comes does."""
         had = self.rooms.get(room)
         if had is None or had.home == home:
             return self
-        return self.closed(room).opened(room, home).noted(
-            room, turn=had.turn, began=had.began, ran_at=had.ran_at, is_spared=had.is_spared
-        )  # fmt: skip
+        kept = {name: getattr(had, name) for name in ("turn", "began", "ran_at", "is_spared")}
+        return self.closed(room).opened(room, home).noted(room, time=Time(price=had.time.price), **kept)
 
     def ended(self, room: Room, now: float) -> Tally[Room]:
         """Returns the tally after the slice of a room, which waits from now on.
@@ -144,7 +153,7 @@ class Tally(Generic[Room]):
         took, key = now - had.ran_at, self.home_of(room)
         home = self.homes[key]
         busy = sum(other.time.is_busy and self.home_of(name) == key for name, other in self.rooms.items())
-        paid = home.time.seconds + took / min(max(busy, 1), HOME_ROOMS)
+        paid = home.time.seconds + took * had.time.price / min(max(busy, 1), HOME_ROOMS)
         tally = self.noted(room, time=had.time.ended(took), ran_at=now)
         tally = replace(tally, homes={**tally.homes, key: replace(home, time=replace(home.time, seconds=paid))})
         if room is not self.favour.room:

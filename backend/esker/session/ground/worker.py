@@ -119,6 +119,11 @@ class Worker:
         with self._changed:
             self._tally = self._tally.moved(client, home)
 
+    def attend(self, client: Client, by_somebody: bool) -> None:
+        """From now on somebody is in the room, or nobody: the work of such a room is done behind that of others."""
+        with self._changed:
+            self._tally = self._tally.attended(client, by_somebody)
+
     def request(self, client: Client, job: Job) -> None:
         """Takes the newest job of a room. It replaces the job that waits or runs."""
         self._happen(client, does.Requested(job))

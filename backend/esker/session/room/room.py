@@ -112,6 +112,7 @@ class Room(ClassRoom):
             note=self._feed.note,
             home=home or None,
         )
+        worker.attend(self._solve_client, False)
         hydrology = tiles.hydrology if isinstance(tiles, WateredTiles) else None
         self._rivers = Rivers(hydrology, self._feed, self._loop)
         self._rivers.works_for(home)
@@ -180,6 +181,7 @@ class Room(ClassRoom):
         if self.scoring.newest is not None:
             outbox.message(self.scoring.newest)
         self._works_for(member)
+        self._worker.attend(self._solve_client, True)
         self.show()
         guest = Guest(member, self._feed.add(outbox))
         self.conducting.joined(member)
@@ -203,6 +205,7 @@ class Room(ClassRoom):
         self.conducting.left(guest.member)
         self._presence_soon()
         if not len(self.core.members):
+            self._worker.attend(self._solve_client, False)
             self._on_empty(self)
 
     def idle_for(self, seconds: float) -> bool:
