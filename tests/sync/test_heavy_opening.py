@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from esker import contract as c
@@ -125,12 +127,33 @@ def test_a_document_read_in_pieces_is_that_read_at_once(heavy: Document) -> None
     assert document_json(few) == few.model_dump_json()
 
 
+NAMES = st.text(st.sampled_from('{}[]",:\\/ \n\u2028aä😀'), max_size=12)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(labels=st.lists(NAMES, max_size=4), ascii_only=st.booleans(), indent=st.sampled_from([None, 1]))
+def test_marks_in_names_end_no_stroke(labels: list[str], ascii_only: bool, indent: int | None) -> None:
+    """SPEC J395: neither do flanks, paint and escaped quotation marks."""
+    left, paint = c.Flank(slope_deg=30.0), c.Paint(channel="snow", value=0.5, radius_m=9.0)
+    ends: dict[str, Any] = {"first": (0.0, 0.0, 0.0), "last": (9.0, 1.0, 1.0), "curve": ((0.0, 0.5),)}
+    strokes = [c.Stroke(id=f"s{k}", kind="profile", label=label, left=left, **ends) for k, label in enumerate(labels)]
+    strokes += [stroke.model_copy(update={"id": f"p{stroke.id}", "kind": "paint", "paint": paint, "left": None})
+                for stroke in strokes]  # fmt: skip
+    raw = json.loads(document_json(Document(id="t", strokes=tuple(strokes))))
+    for stroke, label in zip(raw["strokes"], labels, strict=False):
+        stroke["label"] = label  # as a text from elsewhere would be: with what a name does not show
+    text = json.dumps(raw, indent=indent, ensure_ascii=ascii_only)
+    assert read_document(text) == Document.model_validate_json(text)
+
+
 @pytest.mark.parametrize(
     "text",
     [
         "", "[]", "{", "{}", '{"id":"a"} x', '{"id":"a",}', '{"id":"a","strokes":[1,]}', '{"id":"a","strokes":[}',
         '{"id":"a","strokes":null}', '{"id":"a","strokes":[{}]}', '{"id":"a","what":1}', '{"id":"a" "clock":1}',
-        '{"id":"a","strokes":[' + "[" * 100_000, '{1:2}', '{"id":"a","layers":[{"id":3}]}', "nonsense",
+        '{"id":"a","strokes":[{"id":"b}]}', '{"id":"a","strokes":[{"id":"b" "kind":1}]}',
+        '{"id":"a","strokes":[' + "[" * 100_000, '{"id":"a","strokes":[' + '{"' * 100_000,
+        '{1:2}', '{"id":"a","layers":[{"id":3}]}', "nonsense",
     ],
 )  # fmt: skip
 def test_what_is_no_document_is_refused_as_before(text: str) -> None:
