@@ -6,6 +6,7 @@ import shutil
 import sqlite3
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import closing
 from pathlib import Path
@@ -95,34 +96,45 @@ def test_the_log_has_its_length_from_the_start_and_is_read_as_far_as_it_is_writt
     journal.close()
 
 
+def _at_checkpoints(monkeypatch: pytest.MonkeyPatch, happen: Callable[[], object], every: int) -> None:
+    """Has something happen where the thread begins a checkpoint, after so many commits each."""
+
+    class Watched(sqlite3.Connection):
+        def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:
+            if "wal_checkpoint" in sql:
+                happen()
+            return super().execute(sql, *values)
+
+    real = sqlite3.connect
+    monkeypatch.setattr(sqlite3, "connect", lambda *a, **k: real(*a, **k, factory=Watched))
+    monkeypatch.setattr(checkpoints, "EVERY", every)
+
+
 def test_commits_go_on_while_a_checkpoint_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC J567: whoever's commit began one waited for the disk twice."""
     begun, may_go_on = threading.Event(), threading.Event()
 
-    class Slow(sqlite3.Connection):
-        def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:
-            if "wal_checkpoint" in sql:
-                begun.set()
-                may_go_on.wait(10)
-            return super().execute(sql, *values)
+    def stands() -> None:
+        begun.set()
+        may_go_on.wait(120)
 
-    real = sqlite3.connect
-    monkeypatch.setattr(sqlite3, "connect", lambda *a, **k: real(*a, **k, factory=Slow))
-    monkeypatch.setattr(checkpoints, "EVERY", 5)
-    journal = Journal(tmp_path)
-    journal.create(BIRTH).result()
-    before = tmp_path.joinpath(DATABASE_NAME).read_bytes()
-    for clock in range(1, 30):  # some 1,400 pages
-        journal.append("t", [Row(clock, "c", clock, "c", "x" * 200_000)]).result(10)
-    assert begun.wait(10)
-    assert not may_go_on.is_set(), "all of this was acknowledged meanwhile"
-    assert tmp_path.joinpath(DATABASE_NAME).read_bytes() == before, "the writer makes none itself"
-    may_go_on.set()
-    deadline = time.monotonic() + 10
-    while tmp_path.joinpath(DATABASE_NAME).read_bytes() == before and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert tmp_path.joinpath(DATABASE_NAME).read_bytes() != before
-    journal.close()
+    _at_checkpoints(monkeypatch, stands, every=5)
+    journal, file = Journal(tmp_path), tmp_path / DATABASE_NAME
+    try:
+        journal.create(BIRTH).result()
+        before = file.read_bytes()
+        for clock in range(1, 30):  # some 1,400 pages
+            journal.append("t", [Row(clock, "c", clock, "c", "x" * 200_000)]).result(60)
+        assert begun.wait(60)
+        assert file.read_bytes() == before, "the writer makes none itself"
+        may_go_on.set()
+        deadline = time.monotonic() + 60
+        while file.read_bytes() == before and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert file.read_bytes() != before
+    finally:
+        may_go_on.set()
+        journal.close()
 
 
 def test_the_writer_makes_a_checkpoint_where_the_log_grows_long(
@@ -130,21 +142,15 @@ def test_the_writer_makes_a_checkpoint_where_the_log_grows_long(
 ) -> None:
     """SPEC J567: also where those beside it fail, which stops nobody."""
 
-    class Fails(sqlite3.Connection):
-        def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:
-            if "wal_checkpoint" in sql:
-                raise sqlite3.OperationalError("disk I/O error")
-            return super().execute(sql, *values)
+    def fails() -> None:
+        raise sqlite3.OperationalError("disk I/O error")
 
-    real = sqlite3.connect
-    monkeypatch.setattr(sqlite3, "connect", lambda *a, **k: real(*a, **k, factory=Fails))
-    monkeypatch.setattr(checkpoints, "EVERY", 1)
+    _at_checkpoints(monkeypatch, fails, every=1)
     journal = Journal(tmp_path)
     journal.create(BIRTH).result()
-    log, big = tmp_path / f"{DATABASE_NAME}-wal", "x" * 200_000
     for clock in range(1, 150):
-        journal.append("t", [Row(clock, "c", clock, "c", big)]).result()
-    assert log.stat().st_size == LOG_BYTES
+        journal.append("t", [Row(clock, "c", clock, "c", "x" * 200_000)]).result()
+    assert tmp_path.joinpath(f"{DATABASE_NAME}-wal").stat().st_size == LOG_BYTES
     assert "a checkpoint failed: disk I/O error" in caplog.text
     assert journal.writable
     journal.close()

@@ -82,8 +82,8 @@ class Room(ClassRoom):
     ) -> None:
         """``elevation`` makes the base of the layers, in a thread of ``base_threads``; without them nothing is laid.
         ``desk``: what a lesson asks of the server; ``home``: the address of who opened it, for whom its work is done
-        until somebody comes who draws. ``on_lost``: what is in the journal is known no longer. Nothing
-        is solved until somebody is to see its ground (``show``)."""
+        until somebody comes who draws. ``on_lost``: what is in the journal is known no longer. Nothing is solved until
+        somebody is to see its ground (``show``)."""
         self.core, self.info = core, info
         self.id = core.document.id
         self._journal, self._worker, self._on_empty = journal, worker, on_empty
