@@ -143,7 +143,7 @@ def main() -> None:
                 case "append":
                     future = journal.append(terrain, [row])
                 case "snapshot":
-                    future = journal.append(terrain, [row], c.Document(id=terrain, clock=int(clock)))
+                    future = journal.keep_snapshot(c.Document(id=terrain, clock=int(clock)))
                 case "link":
                     future = Access(journal).add(terrain, "edit", "zombie")
                 case _:

@@ -12,8 +12,9 @@ from contextlib import closing
 from pathlib import Path
 
 from esker import contract as c
-from esker.document.wire import op_json
+from esker.document.wire import Compressed, op_json
 from esker.store.access import Access
+from esker.store.classes import Class, ClassStore
 from esker.store.journal import Journal, Row
 from esker.store.upkeep.inspection import DATABASE_NAME
 
@@ -26,7 +27,7 @@ def _stroke(i: int) -> c.Stroke:
 
 
 def main(target: Path) -> None:
-    """One terrain "t" of seven ops by client "c", and a link of each role."""
+    """One terrain "t" of seven ops by client "c", a link of each role, and a class "k" that begins as a stroke."""
     with tempfile.TemporaryDirectory() as folder:
         journal = Journal(Path(folder))
         journal.create(c.Document(id="t")).result()
@@ -35,6 +36,9 @@ def main(target: Path) -> None:
         journal.append("t", [Row(i + 1, "c", i + 1, "c", op_json(op)) for i, op in enumerate(ops)]).result()
         access = Access(journal)
         secrets = [access.add("t", role, role).result()[1] for role in ROLES]
+        begins = c.Document(id="t", clock=1, strokes=(_stroke(0),))
+        made = Class("k", "t", "A class", journal.now(), 1, 1, 30, None, 0.0, None)
+        ClassStore(journal).make(made, Compressed.of(begins), 1, 1).result()
         journal.close()
         with closing(sqlite3.connect(Path(folder) / DATABASE_NAME)) as db:
             version = db.execute("PRAGMA user_version").fetchone()[0]

@@ -11,7 +11,7 @@ import pytest
 from bench.cluster._objects import ObjectServer
 from esker import contract as c
 from esker.cli.main import main
-from esker.document.wire import document_json, op_json
+from esker.document.wire import Compressed, op_json
 from esker.patchwork.raster import rasters
 from esker.server.starting import CannotServe
 from esker.store.access import Access
@@ -44,8 +44,9 @@ def filled(data: Path) -> dict[str, Any]:
     for start in range(0, len(done), 3):
         tick = done[start : start + 3]
         now[0] = tick[-1].at
-        snapshot = tick[-1].after.to_document() if start % 60 == 0 else None
-        journal.append("drawn", [each.row for each in tick], snapshot, (Person("ada", "Ada", "#000000"),)).result()
+        journal.append("drawn", [each.row for each in tick], (Person("ada", "Ada", "#000000"),)).result()
+        if start % 60 == 0:
+            journal.keep_snapshot(tick[-1].after.to_document()).result()
     assert Compaction(journal, lambda: 2e9, pause=lambda _: None).terrain("drawn") > 0
     access = Access(journal)
     links = {name: access.add("drawn", "edit", name).result()[1] for name in NAMES}
@@ -58,7 +59,7 @@ def filled(data: Path) -> dict[str, Any]:
     Deletion(journal, lambda: 5e8).delete("t4").result()
     grid = rasters.build(np.full((40, 40), 9.0, np.float32))
     GridStore(data).put(grid)
-    document = document_json(c.Document(id="class"))
+    document = Compressed.of(c.Document(id="class")).data
     journal.submit(
         lambda db: [
             db.execute("INSERT INTO grids VALUES (?,?)", ("drawn", grid.digest)),

@@ -76,11 +76,11 @@ def test_new_terrains_are_written_one_after_another(journal: Journal) -> None:
     more, waiting = threading.Event(), []
     create = journal.create
 
-    def noted(document: c.Document, also: Any = None, by: str | None = None, text: str | None = None) -> Any:
-        assert text is not None, "it was encoded before"
+    def noted(document: c.Document, also: Any = None, by: str | None = None, kept: Any = None) -> Any:
+        assert kept is not None, "it was compressed before"
         written.append(document.id)
         waiting.append(journal.waiting)
-        return create(document, lambda _: more.wait(30), by, text)
+        return create(document, lambda _: more.wait(30), by, kept)
 
     journal.create = noted  # type: ignore[method-assign]
 

@@ -45,7 +45,9 @@ def _stored(journal: Journal, done: list[Done]) -> None:
         journal._now = lambda at=tick[-1].at: at  # type: ignore[misc]
         last = tick[-1]
         due = start // SNAPSHOTS != (start + 3) // SNAPSHOTS
-        journal.append("t", [each.row for each in tick], last.after.to_document() if due else None).result()
+        journal.append("t", [each.row for each in tick]).result()
+        if due:
+            journal.keep_snapshot(last.after.to_document()).result()
 
 
 def _folding(journal: Journal) -> Compaction:

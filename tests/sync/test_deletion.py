@@ -76,7 +76,7 @@ def test_what_was_deleted_is_gone_after_the_grace(store: Store) -> None:
         journal.create(c.Document(id=terrain)).result()
         op = op_json(c.SetTerrain(fields=c.TerrainFields(title="x")))
         rows = [Row(k, "c", k, "c", op) for k in range(1, 1201)]
-        journal.append(terrain, rows, None, (Person("c", "Ann", "#000000"),)).result()
+        journal.append(terrain, rows, (Person("c", "Ann", "#000000"),)).result()
         access.add(terrain, "owner", "o").result()
         journal.submit(
             lambda db, terrain=terrain: [  # type: ignore[misc]

@@ -19,7 +19,7 @@ from esker import contract as c
 from esker.contract import Document
 from esker.document import archive
 from esker.document.former import read_document
-from esker.document.wire import document_json
+from esker.document.wire import compressed, document_json
 from esker.exporting import wire
 from esker.server.run import SWITCH_SECONDS
 from esker.server.upload import read_archive
@@ -91,7 +91,7 @@ def test_a_bystander_has_his_turns_while_a_heavy_journal_is_opened(
     journal.create(heavy).result()
     # Without names: a check of a name gives others the interpreter by chance.
     plain = heavy.model_dump_json(exclude_defaults=True)
-    journal.submit(lambda db: db.execute("UPDATE snapshots SET document=?", (plain,))).result()
+    journal.submit(lambda db: db.execute("UPDATE snapshots SET document=?", (compressed(plain),))).result()
     turns = _turns_while(reads, monkeypatch, "esker.store.journal", lambda: asyncio.to_thread(journal.load, "t"))
     assert reads[-1] == heavy
     assert turns >= TURNS

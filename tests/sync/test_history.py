@@ -96,7 +96,7 @@ def test_a_journal_of_before_has_a_history_without_names_and_times(tmp_path: Pat
         journal.submit(partial(_empty, table)).result()
     journal.close()
     journal = Journal(tmp_path, now=lambda: 1000.0)
-    journal.append("t", rows(4, 1, "d"), None, (Person("d", "Dan", "#000000"),)).result()
+    journal.append("t", rows(4, 1, "d"), (Person("d", "Dan", "#000000"),)).result()
     page = ActivityLogs(journal).page("t", None, 10)
     assert [(e.author, e.at) for e in page.entries] == [("d", 1000.0), ("c", None), ("c", None), ("c", None)]
     assert page.people == {"d": Person("d", "Dan", "#000000")}
@@ -127,7 +127,7 @@ def test_no_clock_is_far_from_a_snapshot(tmp_path: Path) -> None:
     document = c.Document(id="t")
     journal.create(document).result()
     for i in range(1, 101):
-        journal.append("t", (), document.model_copy(update={"clock": i * SNAPSHOT_EVERY})).result()
+        journal.keep_snapshot(document.model_copy(update={"clock": i * SNAPSHOT_EVERY})).result()
         query = "SELECT clock FROM snapshots WHERE terrain='t' ORDER BY clock"
         clocks = [row[0] for row in journal.reader().execute(query)]
         gaps = [b - a for a, b in itertools.pairwise(clocks)]

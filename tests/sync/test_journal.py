@@ -284,7 +284,8 @@ def test_snapshots_shorten_the_replay_and_change_nothing(either: Journal) -> Non
         rows = _rows(first, 7)
         for row in rows:
             document, _ = document.apply(c.OP.validate_json(row.op))
-        either.append("t", rows, document.to_document()).result()
+        either.append("t", rows).result()
+        either.keep_snapshot(document.to_document()).result()
     loaded = either.load("t")
     assert loaded is not None
     assert loaded.document == document

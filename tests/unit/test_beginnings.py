@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
-
 from esker import contract as c
-from esker.document.wire import document_json
+from esker.document.wire import decompressed, document_json
 from esker.lesson.beginnings import CHARACTERS, SECONDS, Beginning, Beginnings
 from esker.session.births import born_as
 
@@ -47,15 +45,18 @@ def test_a_beginning_of_another_clock_is_another_one() -> None:
     assert held.find("a", 2) is None
 
 
-def test_the_text_of_a_copy_is_that_of_its_document() -> None:
+def test_a_copy_is_kept_as_its_document_without_compressing_it_anew() -> None:
+    """SPEC J568."""
     stroke = c.Stroke(id="s", kind="profile", first=(1, 2, 3), last=(90, 5, 6), curve=((0, 1), (1, 2)))
     document = c.Document(id="class", settings=c.TerrainSettings(title='"id":"x"'), strokes=(stroke,))
     beginning = Beginning(document, 1)
     first, second = born_as(document), born_as(document)
-    assert beginning.text_of(first) is None
-    beginning.keep(first, document_json(first))
-    assert beginning.text_of(second) == document_json(second)
+    assert beginning.compressed(first) is None
+    made = beginning.compress(first)
+    kept = beginning.compressed(second)
+    assert kept is not None
+    for document, each in ((first, made), (second, kept)):
+        assert decompressed(each.data) == document_json(document)
+        assert (each.characters, each.title) == (len(document_json(document)), '"id":"x"')
     renamed = second.model_copy(update={"settings": c.TerrainSettings(title="Another")})
-    assert beginning.text_of(renamed) is None
-    with pytest.raises(ValueError, match="begins with its id"):
-        beginning.keep(first, document_json(second))
+    assert beginning.compressed(renamed) is None

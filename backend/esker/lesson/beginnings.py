@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Final
 
 from esker import contract as c
+from esker.document.wire import Compressed, compressed, document_json
 
 CHARACTERS: Final = 16 << 20
 """Documents of so many characters are held, of all classes together; as objects and text they take some five times as
@@ -28,19 +29,25 @@ class Beginning:
         """``characters``: of its JSON text."""
         self.document, self.characters = document, characters
         self.asked = 0.0
-        self._settings: c.TerrainSettings | None = None
-        self._tail = ""
+        self._tail: tuple[c.TerrainSettings, bytes, int] | None = None
+        """What follows the id in copies with these settings, compressed, and its characters."""
 
-    def text_of(self, born: c.Document) -> str | None:
-        """Returns the JSON text of a copy, where one was written before that differs in nothing but its id."""
-        return None if self._settings != born.settings else _head(born) + self._tail
-
-    def keep(self, born: c.Document, text: str) -> None:
-        """Keeps the JSON text of a copy for those that follow. Raises ValueError for a text of another id."""
+    def compressed(self, born: c.Document) -> Compressed | None:
+        """Returns a copy as it is kept, where one was made before that differs in nothing but its id."""
+        if self._tail is None or self._tail[0] != born.settings:
+            return None
+        _, tail, characters = self._tail
         head = _head(born)
+        return Compressed(compressed(head) + tail, len(head) + characters, born.settings.title)
+
+    def compress(self, born: c.Document) -> Compressed:
+        """Returns a copy as it is kept, and has it there for those that follow. It may be called in any thread."""
+        text, head = document_json(born), _head(born)
         if not text.startswith(head):
             raise ValueError("a document begins with its id")
-        self._settings, self._tail = born.settings, text[len(head) :]
+        tail = text[len(head) :]
+        self._tail = (born.settings, compressed(tail), len(tail))
+        return Compressed(compressed(head) + self._tail[1], len(text), born.settings.title)
 
 
 class Beginnings:

@@ -17,7 +17,6 @@ from weakref import WeakValueDictionary
 
 from esker import contract as c
 from esker.document.ops import Refusal, StrokeSet
-from esker.document.wire import document_json
 from esker.errors import Cannot
 from esker.fairness.shares import Who
 from esker.fairness.turns import SERVER, Turns
@@ -86,13 +85,13 @@ class Classes:
         """A class from the terrain of an owner's link as it is, or as it was at a clock. Raises Cannot, Denied."""
         async with self._orders.turn(who):
             document = await self._source(link.terrain, at, who)
-            text = await self.hub.births.encode(document, who)
+            kept = await self.hub.births.compressed(document, who)
             self.hub.door.demand(link)
             lesson, now = secrets.token_urlsafe(9), self.store.now()
             title = title.strip() or document.settings.title
             made = Class(lesson, link.terrain, title, now, document.clock, together, places, None, 0.0, None)
             try:
-                await _done(self.store.make(made, text, c.MAX_CLASSES, MOST_KEPT))
+                await _done(self.store.make(made, kept, c.MAX_CLASSES, MOST_KEPT))
             except TooManyClasses as error:
                 raise Cannot(409, "too_many_classes", MANY_DELETED if error.deleted else MANY) from None
             await _done(self.store.open_door(lesson))
@@ -200,14 +199,13 @@ class Classes:
         start = await self._beginning(lesson, who)
         settings = start.document.settings.model_copy(update={"title": lesson.title})
         born = born_as(start.document.model_copy(update={"settings": settings}))
-        text = start.text_of(born)
-        if text is None:
-            text = await self.hub.read(who, document_json, born)
-            start.keep(born, text)
+        kept = start.compressed(born)
+        if kept is None:
+            kept = await self.hub.read(who, start.compress, born)
         link, _, insert = self.hub.access.make(born.id, "edit", name, None, secret)
         pupil = Pupil(link.id, lesson.id, number, name, self.store.now())
         seated = self.store.seating(insert, pupil, born.id)
-        await self.hub.births.write(born, seated, who, lesson.terrain, text)
+        await self.hub.births.write(born, seated, who, lesson.terrain, kept)
 
     # --- what pages are told ------------------------------------------------------------------------------------
 
@@ -293,9 +291,9 @@ class Classes:
             known = {stroke.id for stroke in before.strokes}
             drawn = tuple(stroke for stroke in now.strokes if stroke.finished or stroke.id in known)
             now = now.model_copy(update={"strokes": drawn})
-            text = await self.hub.births.encode(now, who)
+            kept = await self.hub.births.compressed(now, who)
             changed = await self._each(self.store.copies(lesson.id), partial(merge.additions, before, now), who)
-            await _done(self.store.set_document(lesson.id, now.clock, text))
+            await _done(self.store.set_document(lesson.id, now.clock, kept))
             return changed
 
     async def beginning(self, lesson: Class, who: Who) -> c.Document:
@@ -325,7 +323,7 @@ class Classes:
                 ops = await self._planned(room, plan, who)
                 for op in merge.groups(ops):
                     agent = f"class-{secrets.token_urlsafe(9)}"
-                    self.hub.journal.append(copy.terrain, (), None, (Person(agent, OPENED, TEACHER_COLOUR),))
+                    self.hub.journal.append(copy.terrain, (), (Person(agent, OPENED, TEACHER_COLOUR),))
                     await room.perform(op, agent, agent, teacher=True)
                 changed += bool(ops)
             except (Refusal, Denied) as error:

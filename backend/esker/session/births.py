@@ -1,4 +1,4 @@
-"""New terrains of one server: encoded in a thread, written one after another, each address in its turn (decision 61).
+"""New terrains of a server: compressed in a thread, written one after another, each address in its turn (decision 61).
 
 The document of a new terrain is one row of the database, and the changes of everybody who draws wait for the commit
 that writes it. What one address may have written in this way has a rate in bytes: a copy of a heavy terrain costs
@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from esker import contract as c
-from esker.document.wire import document_json
+from esker.document.wire import Compressed
 from esker.errors import Cannot
 from esker.fairness.shares import Rate, Rates, Who
 from esker.fairness.turns import SERVER, FairThreads, Turns
@@ -33,7 +33,7 @@ class Births:
     """Writes new terrains. Lives in the event loop."""
 
     def __init__(self, journal: Journal, reading: FairThreads, now: Callable[[], float] = time.monotonic) -> None:
-        """``reading``: the threads that documents are encoded in."""
+        """``reading``: the threads that documents are compressed in."""
         self._journal, self._reading, self._now = journal, reading, now
         self._turns = Turns(1, waiting=WAITING)
         self.rates = Rates(BORN, total=ALL_BORN)
@@ -44,31 +44,31 @@ class Births:
         also: Callable[[Any], Any] | None = None,
         who: Who = SERVER,
         by: str | None = None,
-        text: str | None = None,
+        kept: Compressed | None = None,
     ) -> None:
         """Writes a new terrain with what ``also`` writes into the database, or neither. ``by``: the terrain whose rows
-        ``also`` writes beside those of the new one. ``text``: its document as JSON, where that is there already.
+        ``also`` writes beside those of the new one. ``kept``: its document, where it was compressed before.
 
         Raises Cannot (429), shares.Full, store.journal.Unwritable, and what ``also`` raises.
         """
         if who == SERVER:  # what the server makes for itself is empty, and waits for nobody
             await asyncio.wrap_future(self._journal.create(born, also, by))
             return
-        if text is None:
-            text = await self.encode(born, who)
+        if kept is None:
+            kept = await self.compressed(born, who)
         else:
-            self._count(text, who)
+            self._count(kept, who)
         async with self._turns.turn(who):
-            await asyncio.wrap_future(self._journal.create(born, also, by, text))
+            await asyncio.wrap_future(self._journal.create(born, also, by, kept))
 
-    async def encode(self, document: c.Document, who: Who) -> str:
-        """A document that is to be written, as JSON; it counts for ``who``. Raises Cannot (429), shares.Full."""
-        text = await self._reading.run(who, document_json, document)
-        self._count(text, who)
-        return text
+    async def compressed(self, document: c.Document, who: Who) -> Compressed:
+        """A document as it is to be written; it counts for ``who``. Raises Cannot (429), shares.Full."""
+        kept = await self._reading.run(who, Compressed.of, document)
+        self._count(kept, who)
+        return kept
 
-    def _count(self, text: str, who: Who) -> None:
-        if not self.rates.take(Who(who.address), self._now(), len(text)):
+    def _count(self, kept: Compressed, who: Who) -> None:
+        if not self.rates.take(Who(who.address), self._now(), kept.characters):
             raise Cannot(429, "rate_limited", TOO_MUCH)
 
 

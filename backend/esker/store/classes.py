@@ -16,6 +16,7 @@ from typing import Any, Final, NamedTuple
 
 from esker import contract as c
 from esker.document.former import read_document
+from esker.document.wire import Compressed, decompressed
 from esker.store.access import CODE_ALPHABET, CODE_LIFE_SECONDS, SecretTaken, code_length, hashed
 from esker.store.engine.ports import Connection
 from esker.store.journal import Journal
@@ -79,17 +80,18 @@ class ClassStore:
 
     # --- classes ------------------------------------------------------------------------------------------------
 
-    def make(self, made: Class, document: str, most: int, kept: int) -> Future[None]:
-        """Writes a new class with its document as JSON. It fails with TooManyClasses where the terrain has ``most``
-        classes already, or ``kept`` with those that were deleted."""
+    def make(self, made: Class, document: Compressed, most: int, kept: int) -> Future[None]:
+        """Writes a new class with its document. It fails with TooManyClasses where the terrain has ``most`` classes
+        already, or ``kept`` with those that were deleted."""
 
         def write(db: Connection) -> None:
             count = "SELECT count(*), count(*) - count(ended) FROM classes WHERE terrain=?"
             found, live = db.execute(count, (made.terrain,)).fetchone()
             if live >= most or found >= kept:
                 raise TooManyClasses(live < most)
-            self._journal.need(len(document))
-            db.execute(f"INSERT INTO classes ({_COLUMNS},document) VALUES (?,?,?,?,?,?,?,?,?,?,?)", (*made, document))
+            self._journal.need(len(document.data))
+            sql = f"INSERT INTO classes ({_COLUMNS},document) VALUES (?,?,?,?,?,?,?,?,?,?,?)"
+            db.execute(sql, (*made, document.data))
 
         return self._journal.submit(write, made.terrain)
 
@@ -115,11 +117,14 @@ class ClassStore:
     def document(self, lesson: str) -> tuple[c.Document, int] | None:
         """What a copy begins as, and how many characters it has. Blocks for as long as a document takes to be read."""
         row = self._db.execute("SELECT document FROM classes WHERE id=?", (lesson,)).fetchone()
-        return None if row is None else (read_document(row[0]), len(row[0]))
+        if row is None:
+            return None
+        text = decompressed(row[0])
+        return read_document(text), len(text)
 
-    def set_document(self, lesson: str, clock: int, document: str) -> Future[None]:
-        """From now on copies begin as this document (JSON), of the clock ``clock`` of the class's terrain."""
-        return self._write(lesson, "UPDATE classes SET clock=?, document=? WHERE id=?", (clock, document, lesson))
+    def set_document(self, lesson: str, clock: int, document: Compressed) -> Future[None]:
+        """From now on copies begin as this document, of the clock ``clock`` of the class's terrain."""
+        return self._write(lesson, "UPDATE classes SET clock=?, document=? WHERE id=?", (clock, document.data, lesson))
 
     def open_door(self, lesson: str) -> Future[str]:
         """Gives the class a new code; the one before ends."""

@@ -4,11 +4,11 @@ One writer serves all rooms: whatever is queued when a commit ends goes into the
 acknowledged after the commit that holds it, so ``kill -9`` loses nothing that was acknowledged. What a commit is, and
 on what it lies, is the engine's (``engine/``): SQLite in the data folder, or PostgreSQL.
 
-Tables (``upkeep/migrations.py``): ``terrains`` (id, created), ``ops`` (terrain, clock, client, counter, author, op),
-``snapshots`` (terrain, clock, document), ``grids`` (terrain, digest: every grid that a layer of the terrain ever was,
-written in the same commit as the op or the birth that names it); ``store/access.py``, ``store/timestamps.py`` and
-``store/upkeep/folds.py`` use others. Any clock can be opened again; of old gestures only the last op stays
-(``store/upkeep/compaction.py``).
+Tables (``upkeep/migrations.py``): ``terrains`` (id, title), ``ops`` (terrain, clock, client, counter, author, op),
+``snapshots`` (terrain, clock, document as ``document.wire.Compressed``), ``grids`` (terrain, digest: every grid that a
+layer of the terrain ever was, written in the same commit as the op or the birth that names it); ``store/access.py``,
+``store/timestamps.py`` and ``store/upkeep/folds.py`` use others. Any clock can be opened again; of old gestures only
+the last op stays (``store/upkeep/compaction.py``).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from esker import contract as c
 from esker.document.former import read_document, read_op
 from esker.document.history.folding import SILENT, UNLIMITED, silent
 from esker.document.ops import Refusal, StrokeSet
-from esker.document.wire import op_json
+from esker.document.wire import Compressed, decompressed, op_json
 from esker.store import lessons, timestamps
 from esker.store.engine.ports import Connection, Engine
 from esker.store.engine.ports import Unwritable as Unwritable
@@ -33,7 +33,7 @@ from esker.store.row import Row as Row
 from esker.store.row import ordered_json as ordered_json
 from esker.store.space import Space
 from esker.store.upkeep import folds, migrations
-from esker.store.writing import contents, name_grids, put_snapshot
+from esker.store.writing import Snapshots, contents, name_grids, put_snapshot
 
 T = TypeVar("T")
 
@@ -83,6 +83,7 @@ class Journal:
         self.space = Space(directory) if space is None else space
         self.engine: Engine = Sqlite(directory, now(), self.space) if engine is None else engine
         self.engine.hear_of_again = self._recount
+        self._snapshots = Snapshots(self._write_snapshot)
         self.hear_of_full: Callable[[str], object] = lambda _: None
         """Called in the writer's thread with a terrain whose history has no room left."""
 
@@ -126,10 +127,9 @@ class Journal:
         self,
         terrain: str,
         rows: Sequence[Row],
-        snapshot: c.Document | None = None,
         people: Sequence[timestamps.Person] = (),
     ) -> Future[None]:
-        """Appends ops (a snapshot after them, and what their authors are called, where that is new).
+        """Appends ops (and what their authors are called, where that is new).
 
         Fails with UsedTwice on a clock or id used before, with Unwritable, Unknown, Moved and HistoryFull.
         """
@@ -146,8 +146,21 @@ class Journal:
                 lessons.keep_makers(db, terrain, made)
             if digests := [digest for row in rows for digest in contents(row.op)]:
                 name_grids(db, terrain, digests)
-            if snapshot is not None:
-                put_snapshot(db, snapshot)
+
+        return self.submit(write, terrain)
+
+    def keep_snapshot(self, document: c.Document) -> Future[None]:
+        """Has a document that the terrain has now, all of whose ops are committed, written beside them, soon.
+
+        The future fails as that of ``append`` does; nothing that was acknowledged is lost then.
+        """
+        return self._snapshots.keep(document)
+
+    def _write_snapshot(self, terrain: str, clock: int, kept: Compressed) -> Future[None]:
+        def write(db: Connection) -> None:
+            if db.execute("SELECT 1 FROM terrains WHERE id=?", (terrain,)).fetchone() is not None:
+                self.need(len(kept.data))
+                put_snapshot(db, terrain, clock, kept)
 
         return self.submit(write, terrain)
 
@@ -187,19 +200,20 @@ class Journal:
         document: c.Document,
         also: Callable[[Connection], Any] | None = None,
         by: str | None = None,
-        text: str | None = None,
+        kept: Compressed | None = None,
     ) -> Future[None]:
-        """A new terrain, born as ``document``, with what ``also`` writes, or neither. ``text``: the document as JSON.
+        """A new terrain, born as ``document``, with what ``also`` writes, or neither.
 
-        ``by``: the terrain whose rows ``also`` writes beside those of the new one. Fails with UsedTwice when the id
-        exists.
+        ``by``: the terrain whose rows ``also`` writes beside those of the new one. ``kept``: the document as it is
+        written, where somebody compressed it before; else this does. Fails with UsedTwice when the id exists.
         """
+        written = Compressed.of(document) if kept is None else kept
 
         def write(db: Connection) -> None:
-            self.need(len(text or ""))
+            self.need(len(written.data))
             db.execute("INSERT INTO terrains (id,created) VALUES (?,?)", (document.id, self._now()))
             name_grids(db, document.id, (layer.content for layer in (*document.layers, *document.deleted_layers)))
-            put_snapshot(db, document, text)
+            put_snapshot(db, document.id, document.clock, written)
             if also is not None:
                 also(db)
 
@@ -276,7 +290,11 @@ class Journal:
             rows = self.steps(terrain, int(snapshot[0]), upto)
             counters = db.execute("SELECT client, max(counter) FROM ops WHERE terrain=? GROUP BY client", (terrain,))
             known = dict(counters.fetchall())
-        document = StrokeSet.from_document(read_document(snapshot[1]))
+        try:
+            text = decompressed(snapshot[1])
+        except ValueError as error:
+            raise DamagedTerrain(f"the journal of {terrain} at op {snapshot[0]}: {error}") from error
+        document = StrokeSet.from_document(read_document(text))
         return Loaded(replay(document, rows), [_as_read(row) for row in rows], known)
 
     def grids(self, terrain: str | None = None) -> set[str]:
@@ -303,6 +321,7 @@ class Journal:
 
     def close(self) -> None:
         """Commits what is queued, then closes every connection."""
+        self._snapshots.close()
         self.engine.close()
 
 

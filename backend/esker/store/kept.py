@@ -24,7 +24,7 @@ SELECT t.id, t.created,
   coalesce((SELECT at FROM moments WHERE terrain=t.id ORDER BY clock DESC LIMIT 1), t.created) AS changed,
   coalesce((SELECT max(clock) FROM ops WHERE terrain=t.id), 0),
   (SELECT count(*) FROM links WHERE terrain=t.id AND revoked IS NULL),
-  (SELECT json_extract(document, '$.settings.title') FROM snapshots WHERE terrain=t.id ORDER BY clock DESC LIMIT 1)
+  t.title
 FROM terrains t
 """
 

@@ -18,9 +18,10 @@ class Journal(Protocol):
         self,
         terrain: str,
         rows: Sequence[Row],
-        snapshot: c.Document | None = None,
         people: Sequence[Person] = (),
     ) -> Future[None]: ...
+
+    def keep_snapshot(self, document: c.Document) -> Future[None]: ...
 
     def keep_lesson(self, terrain: str, state: str) -> Future[None]: ...
 

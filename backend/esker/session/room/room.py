@@ -240,7 +240,7 @@ class Room(ClassRoom):
                 self.core.members.rename(guest.member, rename.name, rename.colour)
                 self._presence_soon()
                 if guest.member.client in self._called and guest.member.role != "view":
-                    self._journal.append(self.id, (), None, self._new_names((guest.member.client,)))
+                    self._journal.append(self.id, (), self._new_names((guest.member.client,)))
             case protocol.Message((c.Conduct() | c.People() | c.Grouping()) as message):
                 self.conducting.receive(guest.member, message)
             case protocol.Reply(message):
@@ -323,7 +323,7 @@ class Room(ClassRoom):
         self._flushed.clear()
         people = self._new_names(row.author for row in batch.rows)
         ordered, self._ordered_at = self._ordered_at, None
-        future = self._journal.append(self.id, batch.rows, batch.snapshot, people)
+        future = self._journal.append(self.id, batch.rows, people)
         future.add_done_callback(lambda f: self._loop.call_soon_threadsafe(self._committed, batch, f, ordered))
 
     def _new_names(self, clients: Iterable[str]) -> list[Person]:
@@ -353,6 +353,8 @@ class Room(ClassRoom):
             return
         if error is None:
             self.core.committed(batch)
+            if batch.snapshot is not None:
+                self._journal.keep_snapshot(batch.snapshot)
             if self._meter is not None and ordered is not None:
                 self._meter.acknowledged(self._loop.time() - ordered)
         else:

@@ -14,6 +14,7 @@ import sqlite3
 from collections.abc import Callable
 from typing import Final
 
+from esker.document.wire import compressed
 from esker.store.engine.ports import Connection
 
 SWEEP_AFTER: Final = 30 * 86_400.0
@@ -116,6 +117,16 @@ _FORMAT_9: Final = ""
 """No table changes: the state of a lesson may hold groups. An Esker of before could not read it and would lift every
 switch of that lesson."""
 
+_FORMAT_10: Final = """
+ALTER TABLE terrains ADD COLUMN title TEXT;
+UPDATE terrains SET title=(
+  SELECT json_extract(document, '$.settings.title') FROM snapshots WHERE terrain=id ORDER BY clock DESC LIMIT 1);
+UPDATE snapshots SET document=compressed(document);
+UPDATE classes SET document=compressed(document);
+"""
+"""Documents are compressed (``document.wire``). Their columns are still declared as text: SQLite keeps bytes as bytes.
+``title``: of the newest snapshot of a terrain."""
+
 
 def _script(text: str) -> Callable[[sqlite3.Connection], None]:
     def run(db: sqlite3.Connection) -> None:
@@ -131,6 +142,11 @@ def _folding(db: sqlite3.Connection) -> None:
     db.execute(_USED_ONCE)  # the statement has a semicolon inside, at which a script would be cut
 
 
+def _compressing(db: sqlite3.Connection) -> None:
+    db.create_function("compressed", 1, compressed, deterministic=True)
+    _script(_FORMAT_10)(db)
+
+
 STEPS: Final[tuple[Callable[[sqlite3.Connection], None], ...]] = (
     _script(_FORMAT_1),
     _script(_FORMAT_2),  # elevation layers
@@ -141,6 +157,7 @@ STEPS: Final[tuple[Callable[[sqlite3.Connection], None], ...]] = (
     _script(_FORMAT_7 + ";" + _CLASSES),  # lessons, classes and their copies
     _script(_FORMAT_8),  # tasks
     _script(_FORMAT_9),  # groups of a lesson
+    _compressing,  # documents are compressed
 )
 """``STEPS[n]`` makes format n + 1 of format n; an empty file has format 0."""
 FORMAT: Final = len(STEPS)

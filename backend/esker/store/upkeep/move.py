@@ -35,7 +35,7 @@ class Table(NamedTuple):
 
 
 TABLES: Final = (
-    Table("terrains", "id,created,deleted", "id", "id"),
+    Table("terrains", "id,created,deleted,title", "id", "id"),
     Table("ops", "terrain,clock,client,counter,author,op", "clock"),
     Table("snapshots", "terrain,clock,document", "clock"),
     Table("links", "id,terrain,role,name,hash,created,revoked,parent", "id"),

@@ -21,14 +21,13 @@ _PART: Final = re.compile(
     r"'(?:[^']|'')*'"  # texts stay as they are
     r"|\?(?P<number>\d*)"
     rf"|(?P<before>\b(?:FROM|JOIN|INTO|UPDATE)\s+)(?P<table>{'|'.join(TABLES)})\b"
-    r"|(?P<function>\bjson_extract)\("
 )
 _VALUES: Final = re.compile(r"(INSERT INTO \w+(?: \([\w,]+\))? VALUES )(\([?,]+\))((?: ON CONFLICT DO NOTHING)?)")
 
 
 @lru_cache(maxsize=1024)
 def translated(sql: str) -> str:
-    """A statement with numbered values, and with the schema before tables and functions.
+    """A statement with numbered values, and with the schema before tables.
 
     >>> translated("SELECT op FROM ops WHERE terrain=? AND clock>?")
     'SELECT op FROM esker.ops WHERE terrain=$1 AND clock>$2'
@@ -42,9 +41,7 @@ def translated(sql: str) -> str:
         if found["number"] is not None:
             count += 1
             return f"${found['number'] or count}"
-        if found["table"]:
-            return f"{found['before']}{SCHEMA}.{found['table']}"
-        return f"{SCHEMA}.{found['function']}(" if found["function"] else found[0]
+        return f"{found['before']}{SCHEMA}.{found['table']}" if found["table"] else found[0]
 
     return _PART.sub(one, sql)
 

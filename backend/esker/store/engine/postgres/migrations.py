@@ -8,13 +8,15 @@ and a kill leaves the format before. An older release refuses a newer format, an
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Final
 
 import psycopg
 
+from esker.document.wire import compressed
 from esker.store.engine.ports import BadDatabase
 from esker.store.engine.postgres.connections import Database, connect, first_line, place_of
-from esker.store.engine.postgres.dialect import SCHEMA
+from esker.store.engine.postgres.dialect import SCHEMA, translated
 from esker.store.upkeep.migrations import FORMAT, SWEEP_AFTER
 
 LOCK: Final = 0x65736B6572
@@ -107,8 +109,32 @@ that a write for one that nobody has can lock it. ``nodes``: the servers."""
 _FORMAT_9: Final = ""
 """No table changes (``upkeep/migrations.py``)."""
 
-STEPS: Final[dict[int, str]] = {FIRST: _FORMAT_8, 9: _FORMAT_9}
-"""What makes the format of this number of the one before; the first makes it of nothing."""
+_FORMAT_10: Final = """
+ALTER TABLE esker.terrains ADD title text;
+UPDATE esker.terrains t SET title = (
+  SELECT esker.json_extract(document, '$.settings.title') FROM esker.snapshots s WHERE s.terrain = t.id
+  ORDER BY clock DESC LIMIT 1);
+DROP FUNCTION esker.json_extract;
+ALTER TABLE esker.snapshots ALTER document TYPE bytea USING convert_to(document, 'UTF8');
+ALTER TABLE esker.classes ALTER document TYPE bytea USING convert_to(document, 'UTF8');
+"""
+
+
+def _compress(db: Database) -> None:
+    """Compresses documents one by one: there may be gigabytes of them."""
+    _script(db, _FORMAT_10)
+    for table, key in (("snapshots", "terrain,clock"), ("classes", "id")):
+        where = f"({key}) = ({','.join('?' * len(key.split(',')))})"
+        read = translated(f"SELECT document FROM {table} WHERE {where}")
+        write = translated(f"UPDATE {table} SET document=? WHERE {where}")
+        for row in db.execute(translated(f"SELECT {key} FROM {table}")).fetchall():
+            (text,) = db.execute(read, row).fetchall()[0]
+            db.execute(write, (compressed(text.decode()), *row))
+
+
+Step = str | Callable[[Database], None]
+STEPS: Final[dict[int, Step]] = {FIRST: _FORMAT_8, 9: _FORMAT_9, 10: _compress}
+"""What makes the format of this number of the one before, statements or a function; the first makes it of nothing."""
 
 
 def format_of(db: Database) -> int:
@@ -144,7 +170,7 @@ def _migrate(db: Database, url: str, now: float) -> None:
         db.execute(f"CREATE SCHEMA IF NOT EXISTS {SCHEMA}")
     for number, step in sorted(STEPS.items()):
         if number > present and step:
-            _script(db, step)
+            _script(db, step) if isinstance(step, str) else step(db)
     state = f"INSERT INTO {SCHEMA}.server VALUES ($1,$2) ON CONFLICT (key) DO UPDATE SET value=excluded.value"
     db.execute(state, ("format", str(FORMAT)))
     if not present:
