@@ -115,7 +115,7 @@ def test_a_class_that_comes_in_reads_and_writes_its_beginning_once(
         return document_json(document)
 
     monkeypatch.setattr(ClassStore, "document", counted)
-    monkeypatch.setattr("esker.lesson.classes.document_json", noted)
+    monkeypatch.setattr("esker.lesson.beginnings.document_json", noted)
     own = server.join(teacher.terrain, teacher.secret, "t")
     own.ops(("t:1", stroke("s1")), ("t:2", {"type": "stroke.finish", "stroke": "s1"}))
     own.wait("ack")

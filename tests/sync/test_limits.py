@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from esker import contract as c
+from esker.fairness.buckets import TokenBucket
 from esker.fairness.shares import Rate, Rates, Who
 from esker.server.settings import BadSetting, Settings, from_environment
 from esker.session.room import protocol
-from esker.session.room.limits import TokenBucket
 from tests.sync.harness import LiveServer, Peer, set_op, stroke
 
 HELLO = json.dumps({"type": "hello", "protocol": c.PROTOCOL_VERSION, "terrain": "t", "secret": "s", "client": "c"})

@@ -21,12 +21,12 @@ from pydantic import ValidationError
 from esker import contract as c
 from esker.contract import CloseCode
 from esker.errors import Cannot, EskerError
+from esker.fairness.buckets import TokenBucket
 from esker.fairness.shares import Full, Places, Share, Who
 from esker.fairness.spending import Accounts
 from esker.lesson.classes import Classes
 from esker.session.ground.frames.stream import Stream
 from esker.session.room.core import Denied
-from esker.session.room.limits import TokenBucket
 from esker.session.room.protocol import HELLO_SECONDS
 from esker.session.room.room import Room
 from esker.session.room.socket import GOODBYE_SECONDS, REASON_BYTES, Transport

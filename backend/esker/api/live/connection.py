@@ -22,7 +22,7 @@ from esker.api.link import Link, Refused
 from esker.api.live.ground import StreamedGround
 from esker.document.sync import Diverged, SyncDoc
 from esker.document.wire import op_json
-from esker.session.room.limits import TokenBucket
+from esker.fairness.buckets import TokenBucket
 from esker.tiles.codec.frame import FrameError
 
 log = logging.getLogger("esker.api.live")

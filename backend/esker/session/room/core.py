@@ -16,12 +16,11 @@ from esker import contract as c
 from esker.contract import CloseCode, RejectCode, Role
 from esker.document.ops import Limits, Refusal, StrokeSet
 from esker.document.wire import op_json
-from esker.fairness.shares import RANK, Full, Place, Places, Rates, Who, homes
+from esker.fairness.shares import RANK, Full, Place, Places, Rate, Rates, Who, homes
 from esker.session.lesson.rules import WAIT, Lesson
 from esker.session.room import protocol
 from esker.session.room.entry import Denied as Denied
 from esker.session.room.entry import Owners
-from esker.session.room.limits import history_rates
 from esker.session.room.members import Member, Members, seats
 from esker.session.room.outbox import Long, Outbox
 from esker.session.room.replicas.replicas import Replicas
@@ -33,6 +32,15 @@ from esker.version import VERSION
 UNSAVED: Final = "The server could not save this change (is its disk full?). It was taken back."
 MOST_AGAINST: Final = protocol.MAX_REFUSED_OPS
 """The connection is closed after so many ops in a row that the lesson did not allow."""
+
+
+def history_rates() -> Rates:
+    """Returns what the journal of a server takes: characters of operations, by link, by address and in all.
+
+    A pen sends some 10,000 a second: a class behind one address, and on one link, draws without meeting this.
+    """
+    mega = 1 << 20
+    return Rates(Rate(mega, 32 * mega), link=Rate(mega / 2, 16 * mega), total=Rate(8 * mega, 128 * mega))
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,10 @@ from esker.session.ground.frames.tilethread import TileThread
 from esker.session.ground.ports import Elevation, Tiles
 from esker.session.ground.worker import Worker
 from esker.session.room.conducting import Desk
-from esker.session.room.core import Denied, RoomCore, RoomInfo
+from esker.session.room.core import Denied, RoomCore, RoomInfo, history_rates
 from esker.session.room.door import Door
 from esker.session.room.history_view import HistoryCore, HistoryRoom, HistoryRooms, Present
 from esker.session.room.lessons import Lessons
-from esker.session.room.limits import history_rates
 from esker.session.room.openrooms import ClosedRooms, OpenRooms
 from esker.session.room.outbox import Outbox, Waiting
 from esker.session.room.ports import Meter, Tenancy

@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails
 
 from esker import contract as c
 from esker.contract import CloseCode, RejectCode
-from esker.session.room.limits import TokenBucket
+from esker.fairness.buckets import TokenBucket
 
 HELLO_SECONDS: Final = 10.0
 MAX_MESSAGES_PER_SECOND: Final = 600

@@ -1,16 +1,15 @@
 """The room: one open terrain, the only owner of its document, members and tiles (DESIGN 8).
 
 Everything here runs in the event loop's thread; the journal's writer, the solver and the tile thread call back into
-it. ``core.py`` holds the rules; this file holds the timers. A room holds its parts and they know it weakly, so that its
-ground is freed the moment that nobody holds the room.
+it. ``core.py`` holds the rules, ``committing.py`` the way into the journal. A room holds its parts and they know it
+weakly, so that its ground is freed the moment that nobody holds the room.
 """
 
 from __future__ import annotations
 
 import asyncio
-import logging
-from collections.abc import Awaitable, Callable, Iterable
-from concurrent.futures import Executor, Future
+from collections.abc import Awaitable, Callable
+from concurrent.futures import Executor
 from functools import partial
 from typing import Final
 
@@ -30,24 +29,17 @@ from esker.session.lesson.classroom import FROZEN, ClassRoom
 from esker.session.progress import GroundProgress
 from esker.session.rivers import Rivers
 from esker.session.room import protocol
+from esker.session.room.committing import Commits
 from esker.session.room.conducting import Conducting, Desk
-from esker.session.room.core import UNSAVED, Batch, RoomCore, RoomInfo
+from esker.session.room.core import UNSAVED, RoomCore, RoomInfo
 from esker.session.room.entry import Denied
 from esker.session.room.members import QUIET_BACKLOG_BYTES, Member
 from esker.session.room.outbox import Outbox
 from esker.session.room.ports import Journal, Meter, Tenancy
 from esker.session.room.replicas.recent import Encoder
 from esker.session.scoring import Scoring
-from esker.store.engine.ports import Moved, Unknown, Unwritable
-from esker.store.journal import HistoryFull
-from esker.store.timestamps import Person
 
-log = logging.getLogger("esker.room")
-
-TICK: Final = c.TICK_MS / 1000
 PRESENCE_TICK: Final = 1 / c.PRESENCE_HZ
-DOUBT_TICK: Final = 0.1
-"""What is durable waits so long, again and again, while it is not certain whose the terrain is."""
 
 
 class Guest:
@@ -125,20 +117,21 @@ class Room(ClassRoom):
         self._progress = self.progress_kind(core, self._layers, info.levels, self._loop)
         self._job: Job | None = None
         """The job that was asked for last."""
-        self._tick_timer: asyncio.TimerHandle | None = None
-        self._tick_at = float("-inf")
         self._presence_timer: asyncio.TimerHandle | None = None
         self._solve_due = False
         self._shown = False
         self._requested_clock = -1
-        self._called: dict[str, Person] = {}
-        """Authors of ops as the journal knows them."""
-        self._encoder = Encoder(core)
-        self._tenancy, self._meter, self._on_lost = tenancy, meter, on_lost
-        self._ordered_at: float | None = None
-        """When the first op came that waits for a tick, where somebody measures."""
-        self._flushed = asyncio.Event()
-        self._flushed.set()
+        self._encoder, self._meter = Encoder(core), meter
+        self._commits = Commits(
+            core,
+            journal,
+            self._loop,
+            tenancy=tenancy,
+            meter=meter,
+            taken=weakly(self._taken),
+            taken_back=weakly(self._request_solve),
+            lost=on_lost,
+        )
         self.conducting = Conducting(
             core,
             journal,
@@ -239,8 +232,7 @@ class Room(ClassRoom):
             case protocol.Message(c.Rename() as rename):
                 self.core.members.rename(guest.member, rename.name, rename.colour)
                 self._presence_soon()
-                if guest.member.client in self._called and guest.member.role != "view":
-                    self._journal.append(self.id, (), self._new_names((guest.member.client,)))
+                self._commits.renamed(guest.member)
             case protocol.Message((c.Conduct() | c.People() | c.Grouping()) as message):
                 self.conducting.receive(guest.member, message)
             case protocol.Reply(message):
@@ -293,7 +285,7 @@ class Room(ClassRoom):
                 known = member.role != "view" if here is None else self.core.lesson.sees(member, here)
                 member.outbox.push(text if known else nameless)
 
-    # --- ticks --------------------------------------------------------------------------------------------------
+    # --- ops ----------------------------------------------------------------------------------------------------
 
     def _ordered(self) -> None:
         """Has ordered ops committed with the next tick, and solved at once."""
@@ -303,68 +295,11 @@ class Room(ClassRoom):
                 self._loop.call_soon(self._solve)
         elif self._progress.settled:
             self._progress.clock_changed()
-        if self._meter is not None and self._ordered_at is None:
-            self._ordered_at = self._loop.time()
-        self._tick_soon()
+        self._commits.ordered()
 
-    def _tick_soon(self) -> None:
-        if self._tick_timer is None and self.core.waiting:
-            # An op that comes after a pause is committed at once (with all that is read in the same turn of the loop).
-            self._tick_timer = self._loop.call_at(max(self._loop.time(), self._tick_at + TICK), self._tick)
-
-    def _tick(self) -> None:
-        self._tick_timer = None
-        batch = self.core.take()
-        if batch is None:
-            return
-        self._tick_at = self._loop.time()
+    def _taken(self) -> None:
         self._rivers.follow(self.core.head)
         self.scoring.follow(self.core.head)
-        self._flushed.clear()
-        people = self._new_names(row.author for row in batch.rows)
-        ordered, self._ordered_at = self._ordered_at, None
-        future = self._journal.append(self.id, batch.rows, people)
-        future.add_done_callback(lambda f: self._loop.call_soon_threadsafe(self._committed, batch, f, ordered))
-
-    def _new_names(self, clients: Iterable[str]) -> list[Person]:
-        """Returns what authors of ops are called, where the journal does not have it from this room yet."""
-        here = (self.core.members.by_client.get(client) for client in dict.fromkeys(clients))
-        people = [self._person(m) for m in here if m is not None]
-        new = [person for person in people if self._called.get(person.client) != person]
-        self._called |= {person.client: person for person in new}
-        return new
-
-    def _person(self, member: Member) -> Person:
-        conducts = self.core.lesson.conducts(member)
-        return Person(member.client, member.name, member.colour, member.person, conducts)
-
-    def _committed(self, batch: Batch, future: Future[None], ordered: float | None) -> None:
-        error = future.exception()
-        if self.closed:
-            return  # another server may have the terrain: authors ask that one what became of this
-        # Where another server can go on, people's work is not taken back: they send it again, here or there.
-        is_away = self._tenancy is not None and isinstance(error, Unwritable) and not error.full
-        if isinstance(error, (Moved, Unknown)) or is_away:
-            log.warning("terrain %s: %s", self.id, error)
-            self._on_lost()
-            return
-        if error is None and self._tenancy is not None and not self._tenancy.may_acknowledge(self.id):
-            self._loop.call_later(DOUBT_TICK, self._committed, batch, future, ordered)
-            return
-        if error is None:
-            self.core.committed(batch)
-            if batch.snapshot is not None:
-                self._journal.keep_snapshot(batch.snapshot)
-            if self._meter is not None and ordered is not None:
-                self._meter.acknowledged(self._loop.time() - ordered)
-        else:
-            log.error("terrain %s: a commit failed: %s", self.id, error)
-            self.core.failed(f"{error} This change was taken back." if isinstance(error, HistoryFull) else UNSAVED)
-            self._request_solve()
-        if self.core.waiting:
-            self._tick_soon()
-        else:
-            self._flushed.set()
 
     # --- the ground ---------------------------------------------------------------------------------------------
 
@@ -448,27 +383,23 @@ class Room(ClassRoom):
 
     async def flush(self) -> None:
         """Returns when every op that was ordered so far is committed or refused."""
-        await self._flushed.wait()
-        while self.core.waiting:
-            self._flushed.clear()
-            self._tick_soon()
-            await self._flushed.wait()
+        await self._commits.flush()
 
     def abandon(self) -> None:
         """Ends without a word to the journal: another server may have the terrain, or nobody knows what was written."""
         self.core.abandon()
         self.shut()
-        self._flushed.set()
+        self._commits.abandon()
 
     def shut(self) -> None:
         """Stops the timers and the solver's work for this room. Call ``flush`` first."""
         self.closed = True
+        self._commits.close()
         self._layers.close()
         self._rivers.close()
         self.scoring.close()
         self.conducting.close()
         self._progress.close()
         self._worker.remove(self._solve_client)
-        for timer in (self._tick_timer, self._presence_timer):
-            if timer is not None:
-                timer.cancel()
+        if self._presence_timer is not None:
+            self._presence_timer.cancel()

@@ -1,10 +1,8 @@
-"""Rates (DESIGN 4). The clock is injected."""
+"""A rate with something saved up (DESIGN 4). The clock is injected."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-
-from esker.fairness.shares import Rate, Rates
 
 
 @dataclass
@@ -27,12 +25,3 @@ class TokenBucket:
             return False
         self._tokens -= n
         return True
-
-
-def history_rates() -> Rates:
-    """Returns what the journal of a server takes: characters of operations, by link, by address and in all.
-
-    A pen sends some 10,000 a second: a class behind one address, and on one link, draws without meeting this.
-    """
-    mega = 1 << 20
-    return Rates(Rate(mega, 32 * mega), link=Rate(mega / 2, 16 * mega), total=Rate(8 * mega, 128 * mega))
