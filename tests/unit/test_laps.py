@@ -10,7 +10,17 @@ from typing import Any
 
 import pytest
 
-from esker.fairness.laps import LAP_REST, LAP_SECONDS, SMALL_LAPS, WAITED, Laps, LapShare
+from esker.fairness import laps as laps_module
+from esker.fairness.laps import (
+    LAP_REST,
+    LAP_SECONDS,
+    SHARED_LAP_REST,
+    SHARED_LAP_SECONDS,
+    SMALL_LAPS,
+    WAITED,
+    Laps,
+    LapShare,
+)
 from esker.fairness.spending import Accounts
 
 
@@ -88,6 +98,34 @@ def test_those_that_take_much_pay_for_what_others_wait() -> None:
         share.take(LAP_SECONDS / 5, LAP_SECONDS / WAITED)
         assert share.left(is_small=False) == 0
         assert share.left(is_small=True) == pytest.approx(LAP_SECONDS * (SMALL_LAPS - 0.2)), "people who draw do not"
+
+    in_loop(run)
+
+
+def test_beside_another_address_those_that_take_much_have_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P666: people who draw have as much as before, and a crowd that is alone does."""
+
+    async def run() -> None:
+        laps = Laps()
+        crowd, other = LapShare(laps), LapShare(laps)
+        for _ in range(3):
+            crowd.take(0.0)
+            assert crowd.left(is_small=False) == pytest.approx(LAP_SECONDS), "it is alone"
+        other.take(0.0001)
+        crowd.take(0.0)
+        assert crowd.left(is_small=False) == pytest.approx(SHARED_LAP_SECONDS)
+        assert crowd.left(is_small=True) == pytest.approx(LAP_SECONDS * SMALL_LAPS)
+        assert other.left(is_small=False) < SHARED_LAP_SECONDS, "and so has the other"
+        third = LapShare(laps)
+        assert third.left(is_small=False) == pytest.approx(SHARED_LAP_SECONDS)
+        crowd.take(1.0)
+        began, came = asyncio.get_running_loop().time(), asyncio.Event()
+        crowd.wait(is_small=False, call=came.set)
+        await came.wait()
+        assert asyncio.get_running_loop().time() - began >= SHARED_LAP_REST * 0.9
+        monkeypatch.setattr(laps_module, "OF_LATE", 0.0)
+        crowd.take(0.0)
+        assert crowd.left(is_small=False) == pytest.approx(LAP_SECONDS), "the other went"
 
     in_loop(run)
 

@@ -4,8 +4,10 @@ whoever comes in the next, so those of an address share a part of each, and wait
 from __future__ import annotations
 
 import asyncio
+import math
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 LAP_SECONDS: Final = 0.003
@@ -17,6 +19,11 @@ so many of processor time; not whole, as sixty people who draw faster than the p
 LAP_REST: Final = 0.006
 """After that they rest for so long, in which threads have what the loop leaves. Connections that take little each time
 only wait for the next lap: thirty people who draw behind one address are a quarter of a core."""
+SHARED_LAP_SECONDS, SHARED_LAP_REST = 0.0015, 0.009
+"""What takes the place of these two for connections that take much, where another address took something of late: an
+operation of somebody there passes three or four laps on its way to its acknowledgement."""
+OF_LATE: Final = 2.0
+"""Seconds for which an address counts as being there."""
 SMALL_LAPS: Final = 1.5
 """One that takes little each time has a turn until those of its address have taken so many times ``LAP_SECONDS``."""
 
@@ -28,6 +35,26 @@ class Laps:
         self._number = 0
         self._loop: asyncio.AbstractEventLoop | None = None
         """The loop that counts the present lap's end."""
+        self._shares = 0
+        self._here = (-1, -math.inf), (-1, -math.inf)
+        """The two shares of which something was taken last, the later one first, by number, and when."""
+
+    def new_share(self) -> int:
+        """Returns the number of a share that begins."""
+        self._shares += 1
+        return self._shares
+
+    def taken(self, share: int) -> None:
+        """Notes that something was taken of a share just now."""
+        last, before = self._here
+        now = asyncio.get_running_loop().time()
+        self._here = (share, now), (before if last[0] == share else last)
+
+    def is_shared(self, share: int) -> bool:
+        """Whether something was taken of another share of late."""
+        last, before = self._here
+        other = before if last[0] == share else last
+        return asyncio.get_running_loop().time() - other[1] < OF_LATE
 
     def now(self) -> int:
         """Returns the number of the present lap, which is greater in the next."""
@@ -77,12 +104,13 @@ class _Taken:
 class LapShare:
     """What the connections of one address take of each lap. Lives in an event loop."""
 
-    __slots__ = ("_held", "_others", "_small", "_taken")
+    __slots__ = ("_held", "_laps", "_number", "_others", "_small", "_taken")
 
     def __init__(self, laps: Laps) -> None:
+        self._laps, self._number = laps, laps.new_share()
         self._taken, self._held = _Taken(laps), _Taken(laps)
-        self._small = _Line(self._taken, LAP_SECONDS * SMALL_LAPS, 0.0)
-        self._others = _Line(self._held, LAP_SECONDS, LAP_REST)
+        self._small = _Line(self._taken, lambda: (LAP_SECONDS * SMALL_LAPS, 0.0))
+        self._others = _Line(self._held, partial(_limits, laps, self._number))
 
     def left(self, is_small: bool) -> float:
         """Returns the seconds of this lap that they still have. ``is_small``: for one that takes little each time."""
@@ -91,6 +119,7 @@ class LapShare:
 
     def take(self, seconds: float, held: float = 0.0) -> None:
         """Notes that one of them took so many seconds of processor time just now, and held the loop up for ``held``."""
+        self._laps.taken(self._number)
         self._taken.take(seconds)
         self._held.take(max(seconds, WAITED * held))
 
@@ -102,13 +131,18 @@ class LapShare:
         return self._small if is_small else self._others
 
 
+def _limits(laps: Laps, share: int) -> tuple[float, float]:
+    return (SHARED_LAP_SECONDS, SHARED_LAP_REST) if laps.is_shared(share) else (LAP_SECONDS, LAP_REST)
+
+
 class _Line:
-    """Those who wait for a lap in which less than ``most`` seconds are taken, looked for every ``rest`` seconds."""
+    """Those who wait for a lap of which less is taken than they may have."""
 
-    __slots__ = ("_is_serving", "_most", "_rest", "_taken", "_waiting")
+    __slots__ = ("_is_serving", "_limits", "_taken", "_waiting")
 
-    def __init__(self, taken: _Taken, most: float, rest: float) -> None:
-        self._taken, self._most, self._rest = taken, most, rest
+    def __init__(self, taken: _Taken, limits: Callable[[], tuple[float, float]]) -> None:
+        """``limits``: the seconds that they may have of a lap, and those after which another lap is looked at."""
+        self._taken, self._limits = taken, limits
         self._waiting: deque[Waiting] = deque()
         self._is_serving = False
 
@@ -119,7 +153,7 @@ class _Line:
 
     def left(self) -> float:
         """Returns the seconds of this lap that are left."""
-        return max(0.0, self._most - self._taken.seconds)
+        return max(0.0, self._limits()[0] - self._taken.seconds)
 
     def join(self, call: Callable[[], None]) -> Waiting:
         """Waits at the end of the line."""
@@ -131,8 +165,9 @@ class _Line:
 
     def _again(self) -> None:
         loop = asyncio.get_running_loop()
-        if self._rest > 0:
-            loop.call_later(self._rest, self._serve)
+        rest = self._limits()[1]
+        if rest > 0:
+            loop.call_later(rest, self._serve)
         else:
             loop.call_soon(self._serve)
 
