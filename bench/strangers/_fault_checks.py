@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from esker import contract as c
-from esker.document.wire import op_json
+from esker.document.wire import decompressed, op_json
 from esker.patchwork.raster import rasters
 from esker.store.access import Access
 from esker.store.grids import GridStore
@@ -20,6 +20,7 @@ from esker.store.upkeep.inspection import DATABASE_NAME, problem_of
 
 OLD_FORMAT: Final = 5
 OLD_OPS: Final = 20_000
+OLD_DOCUMENTS: Final = 30
 
 
 class Checks:
@@ -50,9 +51,11 @@ class Checks:
 
 
 def old_database(data: Path) -> None:
-    """A database of an earlier format, OLD_FORMAT, with one terrain of many ops."""
+    """A database of an earlier format, OLD_FORMAT: a terrain of many ops, and some of heavy documents."""
     journal = Journal(data)
     journal.create(c.Document(id="t")).result()
+    for k in range(OLD_DOCUMENTS):
+        journal.create(_heavy(f"u{k}")).result()
     for start in range(0, OLD_OPS, 1000):
         rows = [
             Row(k + 1, "c", k, "c", op_json(c.SetTerrain(fields=c.TerrainFields(title=f"title {k}"))))
@@ -65,9 +68,18 @@ def old_database(data: Path) -> None:
         db.execute("DROP TRIGGER ops_used_once")
         for table in ("folds", "folded_ids", "lessons", "makers", "pupils", "copies", "classes"):
             db.execute(f"DROP TABLE {table}")
-        for column in ("person", "conducts"):
-            db.execute(f"ALTER TABLE people DROP COLUMN {column}")
+        for table, column in (("people", "person"), ("people", "conducts"), ("terrains", "title")):
+            db.execute(f"ALTER TABLE {table} DROP COLUMN {column}")
+        db.create_function("text_of", 1, decompressed, deterministic=True)
+        db.execute("UPDATE snapshots SET document=text_of(document)")
         db.execute(f"PRAGMA user_version={OLD_FORMAT}")
+
+
+def _heavy(terrain: str) -> c.Document:
+    ends = {"first": (0.0, 0.0, 0.0), "last": (900.0, 0.0, 5.0)}
+    curve = tuple((float(k), k * k % 97 / 3) for k in range(40))
+    made = [c.Stroke.model_validate({"id": f"s{k}", "kind": "profile", "curve": curve, **ends}) for k in range(200)]
+    return c.Document(id=terrain, strokes=tuple(made))
 
 
 def opens(data: Path) -> list[str]:
@@ -81,6 +93,10 @@ def opens(data: Path) -> list[str]:
         loaded = journal.load("t")
         if loaded is None or loaded.document.clock != OLD_OPS or len(journal.rows("t", 0)) != OLD_OPS:
             out.append("a migration lost operations")
+        for k in range(OLD_DOCUMENTS):
+            heavy = journal.load(f"u{k}")
+            if heavy is None or heavy.document.to_document() != _heavy(f"u{k}"):
+                out.append(f"a migration lost document {k}")
     finally:
         journal.close()
     return out
