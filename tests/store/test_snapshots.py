@@ -102,13 +102,20 @@ def test_commits_go_on_while_a_snapshot_is_compressed(journal: Journal, monkeypa
     assert (loaded.document.clock, loaded.recent) == (3, [])
 
 
-def test_what_waits_is_written_before_a_journal_closes(store: Store) -> None:
+def test_what_waits_is_written_before_a_journal_closes(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC J569."""
     journal = store.open()
     journal.create(BIRTH).result()
     journal.append("t", [_row(1)]).result()
+    gate = Gate(monkeypatch)
     journal.keep_snapshot(_at(1))
-    journal.close()
+    assert gate.begun.acquire(timeout=60)
+    closing = threading.Thread(target=journal.close)
+    closing.start()
+    closing.join(0.2)
+    assert closing.is_alive()
+    gate.open.set()
+    closing.join(60)
     again = store.open()
     assert _clocks(again) == [0, 1]
 

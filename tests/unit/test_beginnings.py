@@ -51,12 +51,12 @@ def test_a_copy_is_kept_as_its_document_without_compressing_it_anew() -> None:
     document = c.Document(id="class", settings=c.TerrainSettings(title='"id":"x"'), strokes=(stroke,))
     beginning = Beginning(document, 1)
     first, second = born_as(document), born_as(document)
-    assert beginning.compressed(first) is None
+    assert beginning.find(first) is None
     made = beginning.compress(first)
-    kept = beginning.compressed(second)
+    kept = beginning.find(second)
     assert kept is not None
     for document, each in ((first, made), (second, kept)):
         assert decompressed(each.data) == document_json(document)
         assert (each.characters, each.title) == (len(document_json(document)), '"id":"x"')
     renamed = second.model_copy(update={"settings": c.TerrainSettings(title="Another")})
-    assert beginning.compressed(renamed) is None
+    assert beginning.find(renamed) is None

@@ -29,7 +29,7 @@ SMALL_LAPS: Final = 1.5
 
 
 class Laps:
-    """Numbers the laps of the event loop that runs."""
+    """Numbers the laps of the event loop that runs, and knows whose shares of them something was taken of last."""
 
     def __init__(self) -> None:
         self._number = 0

@@ -16,8 +16,8 @@ from esker import contract as c
 from esker.document.wire import Compressed, compressed, document_json
 
 CHARACTERS: Final = 16 << 20
-"""Documents of so many characters are held, of all classes together; as objects and text they take some five times as
-many bytes. One that has more by itself is read each time."""
+"""Documents of so many characters are held, of all classes together; as objects they take some four times as many
+bytes. One that has more by itself is read each time."""
 SECONDS: Final = 180.0
 """Nothing is held for longer after the last one that asked for it."""
 
@@ -32,7 +32,7 @@ class Beginning:
         self._tail: tuple[c.TerrainSettings, bytes, int] | None = None
         """What follows the id in copies with these settings, compressed, and its characters."""
 
-    def compressed(self, born: c.Document) -> Compressed | None:
+    def find(self, born: c.Document) -> Compressed | None:
         """Returns a copy as it is kept, where one was made before that differs in nothing but its id."""
         if self._tail is None or self._tail[0] != born.settings:
             return None

@@ -199,7 +199,7 @@ class Classes:
         start = await self._beginning(lesson, who)
         settings = start.document.settings.model_copy(update={"title": lesson.title})
         born = born_as(start.document.model_copy(update={"settings": settings}))
-        kept = start.compressed(born)
+        kept = start.find(born)
         if kept is None:
             kept = await self.hub.read(who, start.compress, born)
         link, _, insert = self.hub.access.make(born.id, "edit", name, None, secret)

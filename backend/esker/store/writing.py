@@ -10,6 +10,7 @@ import logging
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
+from functools import partial
 from typing import Final
 
 from esker import contract as c
@@ -101,8 +102,8 @@ class Snapshots:
                 log.exception("no snapshot of %s", document.id)
                 kept.set_exception(error)
             else:
-                written.add_done_callback(lambda done, kept=kept: _hand_on(done, kept))  # type: ignore[misc]
-            del following, document, kept
+                written.add_done_callback(partial(_hand_on, kept))
+            del following, document, kept  # nothing of a room is held while this waits
 
     def _next(self) -> tuple[c.Document, Future[None]] | None:
         with self._changed:
@@ -113,8 +114,8 @@ class Snapshots:
             return self._waiting.pop(next(iter(self._waiting)))
 
 
-def _hand_on(done: Future[None], to: Future[None]) -> None:
-    """What became of one future becomes of another."""
+def _hand_on(to: Future[None], done: Future[None]) -> None:
+    """What became of ``done`` becomes of ``to``."""
     error = done.exception()
     if error is None:
         to.set_result(None)
