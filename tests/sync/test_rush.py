@@ -72,7 +72,8 @@ class Rush:
         """One turn, as the worker takes it."""
         room, self.tally = schedule.choose(self.grounds, self.now, self.tally)
         if room is None:
-            self.now = min(person.due for person in self.people)
+            rest = schedule.rested_in(self.grounds, self.now)
+            self.now = min([person.due for person in self.people] + ([] if rest is None else [self.now + rest]))
             return
         begins, gone, self.tally = schedule.begin(room, self.grounds, self.now, self.tally)
         for other in gone:

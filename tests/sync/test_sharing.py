@@ -6,8 +6,10 @@ Nothing runs here: grounds, tally and time are values.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
+import pytest
 
 from esker import contract as c
 from esker.events import Done, Preview, Settled
@@ -16,7 +18,7 @@ from esker.session.ground import effects as does
 from esker.session.ground import machine, schedule, states
 from esker.session.ground.effects import Effect, Event
 from esker.session.ground.jobs import Job
-from esker.session.ground.states import Early, Ground, Idle, Previewing, Settling
+from esker.session.ground.states import Early, Ground, Idle, Previewing, Refining, Settling
 from esker.session.ground.tally import PATIENCE, Tally
 
 SETTINGS = c.TerrainSettings()
@@ -33,6 +35,8 @@ class Desk:
         self.left: dict[int, list[Preview | Settled]] = {}
         """What the solve of each room has yet to give."""
         self.log: list[tuple[int, str]] = []
+        self.times: list[float] = []
+        """When each entry of ``log`` was written."""
         self.pace: dict[int, float] = {}
 
     def room(self, levels: int = 2) -> int:
@@ -67,15 +71,19 @@ class Desk:
                 self.now += seconds
                 self.tally = self.tally.ended(room, self.now)
                 self.happen(room, does.EarlyMade(effect.job, Preview(0, FLAT)))
-                self.log.append((room, f"early {effect.job.clock}"))
+                self._note(room, f"early {effect.job.clock}")
                 return room
         result = self.left[room].pop(0) if self.left[room] else None
         self.now += self.pace.get(room, seconds)
         self.tally = self.tally.ended(room, self.now)
         self.happen(room, Done() if result is None else result)
         if result is not None:
-            self.log.append((room, f"{result.level}{'s' if result.settled else ''}"))
+            self._note(room, f"{result.level}{'s' if result.settled else ''}")
         return room
+
+    def _note(self, room: int, what: str) -> None:
+        self.log.append((room, what))
+        self.times.append(self.now)
 
     def until(self, room: int, what: str, most: int = 200) -> int:
         """Slices until a room has got something."""
@@ -312,6 +320,92 @@ def test_a_pass_that_waits_for_its_turn_is_made_of_the_newest_strokes() -> None:
     assert isinstance(state, Settling)
     assert state.job.clock == 2, "the newest when its turn came"
     assert desk.tally.rooms[room].began == began
+
+
+def _drawn_on(desk: Desk, room: int, clock: int, slices: int, pass_s: float) -> int:
+    """Somebody draws a segment every 50 ms for so many slices; a pass takes ``pass_s``. Returns the next clock."""
+    due = desk.now
+    for _ in range(slices):
+        if desk.now >= due:
+            desk.ask(room, clock)
+            clock, due = clock + 1, desk.now + 0.05
+        desk.pace[room] = 0.002 if desk.left.get(room, [None])[0] in (None, Preview(0, FLAT)) else pass_s / 2
+        if desk.slice(0.002) is None:
+            desk.now += 0.005
+    return clock
+
+
+def _gaps(desk: Desk, room: int, what: str) -> list[float]:
+    came = [at for at, (who, got) in zip(desk.times, desk.log, strict=True) if who == room and got == what]
+    return [after - before for before, after in pairwise(came)]
+
+
+def test_slow_passes_rest_while_somebody_draws() -> None:
+    """SPEC S598: the coarsest level of the newest strokes comes all the while, and the rest ends with the drawing."""
+    desk = Desk(early=True)
+    room = desk.room()
+    clock = _drawn_on(desk, room, 1, 300, pass_s=0.2)
+    gaps = _gaps(desk, room, "2")[2:]
+    rest = states.REST * (0.2 - states.QUICK_PASS)
+    assert len(gaps) > 4
+    assert min(gaps) >= rest + 0.2
+    assert max(gaps) < rest + 0.2 + 0.08, "and no longer"
+    coarsest = sorted(at for at, (_, got) in zip(desk.times, desk.log, strict=True) if got[:5] in ("0", "early"))
+    assert max(after - before for before, after in pairwise(coarsest)) < 0.25, "two slices of the pass at most"
+    desk.ask(room, clock)
+    wanted, last = desk.grounds[room].jobs.wanted, desk.now
+    assert wanted is not None
+    while desk.grounds[room].shown.previewed != wanted.job.number:
+        if desk.slice(0.002) is None:
+            desk.now += 0.005
+    assert desk.now < last + 0.2 + states.PEN_STILL + 0.2 + 0.03, "a pass that goes on, a still pen, and the last pass"
+
+
+def test_quick_passes_follow_each_other() -> None:
+    """SPEC S598."""
+    desk = Desk(early=True)
+    room = desk.room()
+    _drawn_on(desk, room, 1, 300, pass_s=0.03)
+    assert max(_gaps(desk, room, "2")[2:]) < 0.1
+
+
+def _resting(desk: Desk) -> int:
+    """A room whose pass rests."""
+    room = desk.room(4)
+    desk.ask(room)
+    desk.until(room, "4")
+    ground = desk.grounds[room]
+    slow = replace(ground.shown, lead={0: 0.2}, finest_at=desk.now)
+    desk.grounds[room] = replace(ground, shown=slow)
+    desk.ask(room, 2)
+    while desk.slice() is not None:
+        pass
+    assert states.is_resting(desk.grounds[room], desk.now)
+    return room
+
+
+def test_who_rests_is_woken_and_nothing_is_refined_meanwhile() -> None:
+    """SPEC S598."""
+    desk = Desk(early=True)
+    room, refines = _resting(desk), desk.room()
+    desk.grounds[refines] = Ground(2, Refining())
+    assert desk.slice() is None
+    assert schedule.rested_in(desk.grounds, desk.now) == pytest.approx(states.PEN_STILL, abs=0.005)
+    assert desk.tally.rooms[room].time.is_busy, "it goes on where it was among those who share the solver"
+    desk.now += states.PEN_STILL
+    assert schedule.rested_in(desk.grounds, desk.now) is None
+    assert desk.slice() == room
+
+
+@pytest.mark.parametrize(("budget", "levels"), [(schedule.BUDGET, 5), (parked_bytes(4), 0)], ids=["turn", "memory"])
+def test_nobody_rests_while_another_room_waits(budget: int, levels: int) -> None:
+    """SPEC S598: else whoever has many rooms would have the solver meanwhile."""
+    desk = Desk(budget, early=True)
+    room, other = _resting(desk), desk.room(4)
+    desk.ask(other)
+    assert [desk.slice() for _ in range(levels)] == [other] * levels
+    assert states.is_resting(desk.grounds[room], desk.now), "it might"
+    assert desk.slice() == room
 
 
 def test_nobody_waits_while_something_else_is_to_be_done() -> None:

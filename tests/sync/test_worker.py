@@ -52,10 +52,11 @@ OF_JOB = Channels(paint_rev=1)
 MAKING = Channels(beside=PAINTED, making=True, paint_rev=2)
 
 
-def ground(state: State, wanted: Job | None = None, tries: int = 0, **more: Any) -> Ground:
+def ground(state: State, wanted: Job | None = None, tries: int = 0, asked_at: float = math.inf, **more: Any) -> Ground:
     """A ground whose job JOB was begun, unless nothing ever was."""
     begun = None if state in (Idle(), Waiting()) else Attempt(JOB, tries)
-    return Ground(TOP, state, Jobs(None if wanted is None else Attempt(wanted), begun), **{"channels": OF_JOB, **more})
+    jobs = Jobs(None if wanted is None else Attempt(wanted), begun, asked_at)
+    return Ground(TOP, state, jobs, **{"channels": OF_JOB, **more})
 
 
 def opens(job: Job, *, coarsest: bool = True, keeps: bool = False) -> tuple[Effect, ...]:
@@ -71,7 +72,7 @@ NONE: tuple[Effect, ...] = ()
 COARSE, MIDDLE, FINEST = (Preview(level, FLAT) for level in range(3))
 EXACT = Settled(0, FLAT)
 EARLY = Previewing(JOB, 0, {0: NOW}, previews_early=True)
-TRIED = Early(DRAWN.number)
+TRIED, SHOWN = Early(DRAWN.number), Early(DRAWN.number, made=True)
 
 TABLE: list[tuple[Ground, Event, State, tuple[Effect, ...]]] = [
     # a job comes
@@ -214,7 +215,6 @@ def test_states_are_small_values() -> None:
 PASS = Previewing(JOB, 1, {0: NOW, 1: NOW})
 OTHERS = replace(PAINTED, number=4)
 NEW, OLD = replace(SOON, lead={1: 1.0}), replace(SOON, finest_at=NOW - 1.0, lead={1: 1.0})
-SHOWN = Early(DRAWN.number, made=True)
 BEGINS: list[tuple[str, Ground, bool]] = [
     ("nothing is wanted", ground(Settling(JOB)), False),
     ("it was shown early while a pass waited for its turn", ground(EARLY, DRAWN, shown=OLD, early=SHOWN), True),
@@ -244,6 +244,41 @@ BEGINS: list[tuple[str, Ground, bool]] = [
 def test_when_the_newest_job_is_begun(before: Ground, begins: bool) -> None:
     """SPEC P57, P58, S549: at once, but for a preview pass that should end first."""
     assert states.starts(before, NOW) == begins
+
+
+SLOW = Shown(lead={0: 0.15}, finest_at=NOW)
+RESTS: list[tuple[str, Ground, float]] = [
+    ("its finer levels take 50 ms more than a quick pass", ground(EARLY, shown=SLOW), 0.100),
+    ("they take longer than that", ground(EARLY, shown=replace(SLOW, lead={0: 0.9})), states.REST_MOST),
+    ("the pass is quick", ground(EARLY, shown=replace(SLOW, lead={0: states.QUICK_PASS})), 0.0),
+    ("the finest level came a while ago", ground(EARLY, shown=replace(SLOW, finest_at=NOW - 0.05)), 0.050),
+    ("nobody draws any more", ground(EARLY, shown=SLOW, asked_at=NOW - 0.05), 0.030),
+    ("nothing is known of its passes", ground(EARLY, shown=Shown()), -math.inf),
+    ("its coarsest level is not out", ground(Previewing(JOB, previews_early=True), shown=SLOW), -math.inf),
+    ("it could not show newer strokes", ground(Previewing(JOB, 0, {0: NOW}), shown=SLOW), -math.inf),
+    ("a finer level was begun", ground(replace(EARLY, finer=True), shown=SLOW), -math.inf),
+    ("it settles", ground(Settling(JOB), shown=SLOW), -math.inf),
+    ("a newer job was shown early", ground(EARLY, DRAWN, shown=SLOW, early=SHOWN), 0.100),
+    ("a newer job stands on other layers", ground(EARLY, replace(DRAWN, layers_rev=1), shown=SLOW), -math.inf),
+    ("one could not be shown early", ground(EARLY, DRAWN, shown=SLOW, early=TRIED), -math.inf),
+]
+
+
+@pytest.mark.parametrize(("before", "seconds"), [row[1:] for row in RESTS], ids=[row[0] for row in RESTS])
+def test_how_long_finer_levels_wait(before: Ground, seconds: float) -> None:
+    """SPEC S598: while somebody draws, and as long as they lately took."""
+    assert states.rests_until(before) - NOW == pytest.approx(seconds)
+    assert states.is_resting(before, NOW) == (seconds > 0)
+    assert not states.is_resting(before, NOW + max(0.0, seconds) + 1e-9)
+
+
+def test_a_pass_takes_no_time_while_it_rests() -> None:
+    """SPEC S598: what is known of the next one would grow with each rest."""
+    resting = ground(EARLY, shown=SLOW)
+    for waits, took in ((0.1, 0.06), (0.5, 0.46)):  # until it may go on; for 0.4 s more, behind other rooms
+        after, _ = machine.next(resting, does.Turn(begins=False), NOW + waits)
+        after, _ = machine.next(after, FINEST, NOW + waits + 0.06)
+        assert after.shown.lead[0] == pytest.approx(took)
 
 
 def test_what_is_kept_beside_the_state() -> None:

@@ -13,7 +13,7 @@ import pytest
 from esker import contract as c
 from esker.document.revisions import revision
 from esker.events import BaseLevel, ChannelLevel, Preview, Settled, SolveEvent
-from esker.session.ground import states
+from esker.session.ground import states, worker
 from esker.session.ground.worker import TIDY_EVERY, Job, Worker
 
 SETTINGS = c.TerrainSettings()
@@ -54,13 +54,18 @@ class Turnstile:
         self.permits = Permits()
         self.closed: list[int] = []
         self.speaks = False
+        self.previews_early = False
         self.tidied = threading.Event()
 
     def tidy(self) -> int:
         self.tidied.set()
         return 0
 
-    def steps(
+    def steps(self, *what: Any, **more: Any) -> Iterator[SolveEvent]:
+        made = self._steps(*what, **more)
+        return Early(made) if self.previews_early else made
+
+    def _steps(
         self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
     ) -> Iterator[SolveEvent]:
         assert settings == SETTINGS
@@ -85,6 +90,22 @@ class Turnstile:
 
     def refiner(self, basis: object) -> Any:
         raise AssertionError(f"nobody was given {basis}")
+
+
+class Early:
+    """A solve that can show the coarsest level of newer strokes."""
+
+    def __init__(self, made: Iterator[SolveEvent]) -> None:
+        self._made = made
+
+    def __iter__(self) -> Iterator[SolveEvent]:
+        return self
+
+    def __next__(self) -> SolveEvent:
+        return next(self._made)
+
+    def early_preview(self, *_: Any) -> Preview:
+        return Preview(0, FLAT)
 
 
 class Bench:
@@ -136,7 +157,8 @@ class Bench:
 
     def _rests(self) -> bool:
         with self.worker._changed:
-            return all(states.stage(ground, self.now) is None for ground in self.worker._grounds.values())
+            grounds = self.worker._grounds.values()
+            return all(states.stage(each, self.now) is None or states.is_resting(each, self.now) for each in grounds)
 
     def stop(self) -> None:
         self.solver.permits.release(100)
@@ -203,6 +225,29 @@ def test_drawing_without_a_pause_does_not_starve_the_fine_levels() -> None:
         assert max(gaps) <= states.FINEST_WITHIN + 4 * 0.033
         coarse = [entry for entry in bench.got if entry[2] == 0]
         assert len(coarse) > len(finest), "coarse levels still come more often than fine ones"
+
+    _bench(run)
+
+
+def test_a_pass_that_rests_goes_on_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC S598: nothing happens meanwhile that would wake the thread."""
+    monkeypatch.setattr(worker, "IDLE_CHECK", 600.0)
+
+    def run(bench: Bench) -> None:
+        bench.solver.previews_early = True
+        room = bench.room("a")
+        bench.worker.request(room, _job(1))
+        bench.let(1)
+        bench.idle()
+        bench.now += 0.2
+        bench.let(2)
+        bench.idle()
+        bench.worker.request(room, _job(2))
+        assert bench.let(2)[4:] == [("a", 2, 0, False)]
+        bench.idle()
+        assert not bench.solver.permits.spent(), "it rests"
+        bench.now += states.PEN_STILL
+        assert bench.let(1)[5:] == [("a", 2, 1, False)]
 
     _bench(run)
 

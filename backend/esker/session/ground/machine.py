@@ -6,6 +6,7 @@ Nothing here computes, waits or sends: ``worker.py`` carries the effects out, in
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -72,7 +73,7 @@ def _changed(ground: Ground, event: Event, now: float) -> Result:
     """Takes an event from outside of the solve."""
     match event:
         case does.Requested(job):
-            return _want(ground, Attempt(job)), ()
+            return _want(replace(ground, jobs=replace(ground.jobs, asked_at=now)), Attempt(job)), ()
         case does.Again():
             jobs = ground.jobs
             return (ground if jobs.wanted or not jobs.begun else _want(ground, jobs.begun)), ()
@@ -143,7 +144,7 @@ def _begin(ground: Ground, now: float) -> Result:
     after = replace(
         ground,
         state=Previewing(job, 0, {0: now}) if ahead else Previewing(job),
-        jobs=states.Jobs(None, attempt),
+        jobs=replace(ground.jobs, wanted=None, begun=attempt),
         channels=channels,
         shown=replace(ground.shown, heights=None, clock=job.clock),
     )
@@ -162,7 +163,7 @@ def _begin_channels(ground: Ground, attempt: Attempt) -> Result:
     after = replace(
         ground,
         state=only,
-        jobs=states.Jobs(None, attempt),
+        jobs=replace(ground.jobs, wanted=None, begun=attempt),
         channels=replace(channels, making=False, paint_rev=job.paint_rev),
     )
     return after, (effect,)
@@ -191,7 +192,7 @@ def _unsolved(ground: Ground, now: float) -> Result:
         state = Waiting()
         if wanted.job.number == begun.job.number:
             wanted = begun
-    return replace(ground, state=state, jobs=states.Jobs(wanted, begun)), (does.Apologise(again),)
+    return replace(ground, state=state, jobs=replace(ground.jobs, wanted=wanted, begun=begun)), (does.Apologise(again),)
 
 
 def _looking(ground: Ground, looking: bool) -> State:
@@ -220,9 +221,17 @@ def _slice(ground: Ground, now: float) -> Result:
         channels = replace(ground.channels, solved_since=True)
         early, state = replace(ground.early, solved_since=True), ground.state
         if isinstance(state, Previewing) and state.reached >= 0:
-            state = replace(state, finer=True)
+            state = replace(state, finer=True, came=_came(ground, now))
         return replace(ground, state=state, channels=channels, early=early), (does.Step(),)
     return ground, (does.Refine(),) if isinstance(ground.state, Refining) else ()
+
+
+def _came(ground: Ground, now: float) -> Mapping[int, float]:
+    """When each level came, for a pass that goes on: it took no time while it rested."""
+    state = ground.state
+    assert isinstance(state, Previewing)
+    rested = min(now, states.rests_until(ground)) - state.came.get(0, now)
+    return {**state.came, 0: state.came[0] + rested} if rested > 0 else state.came
 
 
 def _slice_beside(ground: Ground) -> Result:

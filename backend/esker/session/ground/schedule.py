@@ -51,13 +51,9 @@ Grounds = Mapping[Room, Ground]
 
 def choose(grounds: Grounds[Room], now: float, tally: Tally[Room]) -> tuple[Room | None, Tally[Room]]:
     """Returns the room whose turn it is, None when there is nothing to do; and the tally after the choice."""
-    found = [(states.stage(ground, now), room) for room, ground in grounds.items()]
-    solving = _solving(grounds)
-    staged = [
-        (stage, room) for stage, room in found if stage is not None and _fits(room, stage, grounds, now, tally, solving)
-    ]
+    staged, resting = _staged(grounds, now, tally)
     waiting = {room for stage, room in staged if stage != REFINE} or {room for _, room in staged}
-    tally = tally.levelled(waiting)
+    tally = tally.levelled(waiting | resting)  # who rests has not come back when it goes on
     if not staged:
         return None, tally
     rooms = tally.rooms
@@ -73,6 +69,21 @@ def choose(grounds: Grounds[Room], now: float, tally: Tally[Room]) -> tuple[Room
         return best, replace(tally, favour=replace(tally.favour, room=None))
     best = _favoured(late, grounds, rooms)
     return best, replace(tally, favour=replace(tally.favour, room=best))
+
+
+def _staged(grounds: Grounds[Room], now: float, tally: Tally[Room]) -> tuple[list[tuple[int, Room]], set[Room]]:
+    """Returns the rooms that have something to do, each with its class, and those whose pass rests.
+
+    None rests while another room waits, be it for memory: passes hold some. While one rests nothing is refined.
+    """
+    solving = _solving(grounds)
+    classes = ((states.stage(ground, now), room) for room, ground in grounds.items())
+    found = [(stage, room) for stage, room in classes if stage is not None]
+    fitting = [(stage, room) for stage, room in found if _fits(room, stage, grounds, now, tally, solving)]
+    resting = {room for stage, room in found if stage != COARSE and states.is_resting(grounds[room], now)}
+    if not resting or any(room not in resting and stage != REFINE for stage, room in found):
+        return fitting, set()
+    return [], resting
 
 
 def _is_quick(stage: int, ground: Ground, had: Used) -> bool:
@@ -94,6 +105,12 @@ def _favoured(late: Sequence[tuple[int, Room]], grounds: Grounds[Room], rooms: M
         return longest
     like = [room for other, room in late if other == stage and grounds[room].top == grounds[longest].top]
     return min(like, key=lambda room: rooms[room].began)
+
+
+def rested_in(grounds: Grounds[Room], now: float) -> float | None:
+    """Returns after how many seconds the first pass that rests goes on; None where none does."""
+    ends = [states.rests_until(ground) for ground in grounds.values()]
+    return min((end - now for end in ends if end > now), default=None)
 
 
 def begin(

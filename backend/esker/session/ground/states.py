@@ -22,6 +22,14 @@ PACE: Final = 0.500
 passes would fill all time, and rooms amid a solve, which hold memory, would pile up."""
 FINISH: Final = 0.300
 """A pass that should end within this time is not left, and early previews of newer jobs are made during it."""
+QUICK_PASS: Final = 0.100
+"""Passes whose finer levels take no longer follow each other: the morph is fluid, and there are processors to spare."""
+REST, REST_MOST = 2.0, 0.200
+"""While somebody draws, finer levels wait so many times what they lately took beyond ``QUICK_PASS``, and so many
+seconds at most: where passes are slow they would take all processors, and the coarsest levels, frames and everybody's
+messages would come late."""
+PEN_STILL: Final = 0.080
+"""Where no newer job has come for so long, nobody draws, and nothing waits."""
 
 
 @dataclass(frozen=True)
@@ -140,10 +148,11 @@ class Early:
 
 @dataclass(frozen=True)
 class Jobs:
-    """wanted: the newest job, if it was not begun. begun: the job that was begun last."""
+    """wanted: the newest job, if it was not begun. begun: the job that was begun last. asked_at: when one came last."""
 
     wanted: Attempt | None = None
     begun: Attempt | None = None
+    asked_at: float = -math.inf
 
 
 @dataclass(frozen=True)
@@ -211,9 +220,29 @@ def early_preview_is_due(ground: Ground, now: float) -> bool:
     wanted, state, early = ground.jobs.wanted, ground.state, ground.early
     if wanted is None or not isinstance(state, Previewing) or not state.previews_early:
         return False
-    if wanted.job.number == early.number or not (early.solved_since or now - early.at >= EARLY_EVERY):
+    spaced = early.solved_since or now - early.at >= EARLY_EVERY or is_resting(ground, now)
+    if wanted.job.number == early.number or not spaced:
         return False
     return state.reached >= 0 and wanted.job.layers_rev == state.job.layers_rev
+
+
+def rests_until(ground: Ground) -> float:
+    """Returns until when the finer levels of a pass wait whose coarsest level is out, and that can show newer ones."""
+    state, shown = ground.state, ground.shown
+    if not isinstance(state, Previewing) or not state.previews_early or state.finer or state.reached != 0:
+        return -math.inf
+    wanted, early = ground.jobs.wanted, ground.early
+    if wanted is not None and wanted.job.layers_rev != state.job.layers_rev:
+        return -math.inf  # its coarsest level cannot be made beside this pass
+    if wanted is not None and early.number == wanted.job.number and not early.made:
+        return -math.inf  # it could not be made
+    rest = min(REST * max(0.0, shown.lead.get(0, 0.0) - QUICK_PASS), REST_MOST)
+    return min(shown.finest_at + rest, ground.jobs.asked_at + PEN_STILL)
+
+
+def is_resting(ground: Ground, now: float) -> bool:
+    """Returns whether a pass waits so that others have the processors."""
+    return now < rests_until(ground)
 
 
 def is_overtaken(ground: Ground) -> bool:

@@ -163,7 +163,8 @@ class Worker:
         while True:
             with self._changed:
                 while (client := self._choose()) is None and not self._stopping and not self._leaving:
-                    if not self._changed.wait(IDLE_CHECK):
+                    rest = schedule.rested_in(self._grounds, self._now())
+                    if not self._changed.wait(IDLE_CHECK if rest is None else rest) and rest is None:
                         break
                 if self._stopping:
                     break
