@@ -17,7 +17,7 @@ from tests.e2e.conftest import Server, Visitors
 
 def test_a_heightmap_is_saved_from_the_page(visitors: Visitors, server: Server) -> None:
     terrain, secret = server.create(template="figure-six")
-    someone = visitors(390, 640)
+    someone = visitors(390, 640, on_map=True)
     someone.open(f"/t/{terrain}#{secret}")
     page = someone.page
     page.keyboard.press("Shift+E")
@@ -44,7 +44,7 @@ def test_a_heightmap_is_saved_from_the_page(visitors: Visitors, server: Server) 
 def test_masks_that_sum_to_one_are_saved_from_the_page(visitors: Visitors, server: Server) -> None:
     """SPEC X380: the switch stands with masks alone, and the file holds what it says."""
     terrain, secret = server.create(template="figure-six")
-    someone = visitors(640, 720)
+    someone = visitors(640, 720, on_map=True)
     someone.open(f"/t/{terrain}#{secret}")
     page = someone.page
     page.keyboard.press("Shift+E")

@@ -89,7 +89,7 @@ def test_german_fits_in_windows_of_three_widths(visitors: Visitors, server: Serv
 def test_a_hint_lies_on_no_bar_and_bars_not_on_each_other(visitors: Visitors, server: Server) -> None:
     """SPEC U690: with the widest inspector, that of whoever leads in German."""
     terrain, secret = server.create(title="Leer")
-    visitor = visitors(1100, 700, locale="de-DE", reduced_motion="reduce")
+    visitor = visitors(1100, 700, locale="de-DE", reduced_motion="reduce", on_map=True)
     visitor.open(f"/t/{terrain}#{secret}")
     keys = visitor.page.keyboard
     keys.press("b")

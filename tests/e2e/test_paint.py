@@ -37,10 +37,10 @@ def middle(stroke: dict[str, Any]) -> tuple[float, float]:
 
 
 def two_people(visitors: Visitors, server: Server) -> tuple[Visitor, Visitor, str, str]:
-    """Ada owns the terrain, Ben has an edit link."""
+    """Ada owns the terrain, Ben has an edit link and the map."""
     terrain, secret = server.create(title="Painted")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit", "name": "Ben"}, secret))
-    ada, ben = visitors(), visitors()
+    ada, ben = visitors(), visitors(on_map=True)
     ada.open(f"/t/{terrain}#{secret}")
     ben.open(f"/t/{terrain}#{link['secret']}")
     return ada, ben, terrain, secret

@@ -39,11 +39,11 @@ def server(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Server]:
     yield from serving(tmp_path, getattr(request, "param", DEFAULT_LEVEL))
 
 
-def two_people(visitors: Visitors, server: Server) -> tuple[Visitor, Visitor, str, str]:
-    """Ada owns the terrain, Ben has an edit link; both see it."""
+def two_people(visitors: Visitors, server: Server, watched_on_map: bool = False) -> tuple[Visitor, Visitor, str, str]:
+    """Ada owns the terrain, Ben has an edit link; both see it, Ben on the map where he only watches."""
     terrain, secret = server.create(title="Together")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit", "name": "Ben"}, secret))
-    ada, ben = visitors(seen=True), visitors()
+    ada, ben = visitors(seen=True), visitors(on_map=watched_on_map)
     ada.open(f"/t/{terrain}#{secret}")
     ben.open(f"/t/{terrain}#{link['secret']}")
     return ada, ben, terrain, secret
@@ -149,7 +149,7 @@ def test_two_people_sketch_one_terrain(visitors: Visitors, server: Server, tmp_p
 @pytest.mark.parametrize("server", [LEVEL], indirect=True)
 def test_the_ground_morphs_under_the_pen_for_both(visitors: Visitors, server: Server) -> None:
     """SPEC E1: while the stroke is still being drawn, the other page's ground has already risen."""
-    ada, ben, _, _ = two_people(visitors, server)
+    ada, ben, _, _ = two_people(visitors, server, watched_on_map=True)
     path = arch(on_screen(ada, 1000, 2000), on_screen(ada, 3000, 2200), 140, steps=40)
     ada.page.keyboard.press("b")
     press_and_move(ada.page, path[:28])
