@@ -384,6 +384,23 @@ def _resting(desk: Desk) -> int:
     return room
 
 
+def test_whoever_draws_is_shown_each_stroke_while_a_pass_rests() -> None:
+    """SPEC S598: also within EARLY_EVERY, as there are no finer levels to keep rooms from."""
+    desk = Desk(early=True)
+    room = _resting(desk)
+    for clock in (3, 4):
+        desk.ask(room, clock)
+        assert desk.slice() == room
+        assert desk.log[-1] == (room, f"early {clock}")
+        assert desk.slice() is None
+    assert desk.times[-1] - desk.times[-2] < states.EARLY_EVERY / 2
+    desk.now += states.PEN_STILL
+    assert desk.slice() == room
+    state = desk.grounds[room].state
+    assert isinstance(state, Previewing)
+    assert state.job.clock == 4, "the newest strokes have the pass"
+
+
 def test_who_rests_is_woken_and_nothing_is_refined_meanwhile() -> None:
     """SPEC S598."""
     desk = Desk(early=True)

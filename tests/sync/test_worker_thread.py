@@ -13,7 +13,7 @@ import pytest
 from esker import contract as c
 from esker.document.revisions import revision
 from esker.events import BaseLevel, ChannelLevel, Preview, Settled, SolveEvent
-from esker.session.ground import states, worker
+from esker.session.ground import schedule, states, worker
 from esker.session.ground.worker import TIDY_EVERY, Job, Worker
 
 SETTINGS = c.TerrainSettings()
@@ -232,6 +232,15 @@ def test_drawing_without_a_pause_does_not_starve_the_fine_levels() -> None:
 def test_a_pass_that_rests_goes_on_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC S598: nothing happens meanwhile that would wake the thread."""
     monkeypatch.setattr(worker, "IDLE_CHECK", 600.0)
+    rests, rested_in = threading.Event(), schedule.rested_in
+
+    def told(*of: Any) -> float | None:
+        seconds = rested_in(*of)
+        if seconds is not None:
+            rests.set()
+        return seconds
+
+    monkeypatch.setattr(schedule, "rested_in", told)
 
     def run(bench: Bench) -> None:
         bench.solver.previews_early = True
@@ -244,9 +253,9 @@ def test_a_pass_that_rests_goes_on_by_itself(monkeypatch: pytest.MonkeyPatch) ->
         bench.idle()
         bench.worker.request(room, _job(2))
         assert bench.let(2)[4:] == [("a", 2, 0, False)]
-        bench.idle()
-        assert not bench.solver.permits.spent(), "it rests"
-        bench.now += states.PEN_STILL
+        assert rests.wait(60)
+        with bench.worker._changed:  # until the thread waits
+            bench.now += states.PEN_STILL
         assert bench.let(1)[5:] == [("a", 2, 1, False)]
 
     _bench(run)
