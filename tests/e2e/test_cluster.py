@@ -49,7 +49,7 @@ def test_the_owner_is_killed_in_the_middle_of_a_stroke_and_both_go_on(visitors: 
     """SPEC E61."""
     terrain, secret = nodes[0].create(title="Two nodes")
     doors = [Balancer([nodes[0].port, nodes[1].port]), Balancer([nodes[1].port, nodes[0].port])]
-    ada, ben = visitors(), visitors(on_map=True)
+    ada, ben = visitors(on_map=True), visitors(on_map=True)
     for person, door in ((ada, doors[0]), (ben, doors[1])):
         person.origin = door.url
         person.open(f"/t/{terrain}#{secret}")

@@ -19,7 +19,7 @@ PROFILE = "() => window.esker.profile()"
 def test_a_profile_follows_what_somebody_else_draws(visitors: Visitors, server: Server, tmp_path: Path) -> None:
     terrain, secret = server.create(title="Section")
     link = json.loads(server.request("POST", f"/api/terrains/{terrain}/links", {"role": "edit", "name": "Ben"}, secret))
-    ada, ben = visitors(1180, 760, device_scale_factor=0.5), visitors(640, 480, on_map=True)
+    ada, ben = visitors(1180, 760, device_scale_factor=0.5), visitors(640, 480)
     ada.open(f"/t/{terrain}#{secret}")
     ben.open(f"/t/{terrain}#{link['secret']}")
     draw(ben, "b", arch(on_screen(ben, 900, 1700), on_screen(ben, 3200, 1900), 60))

@@ -29,9 +29,9 @@ def _press(page: Visitor, selector: str, words: str) -> None:
     page.page.locator(selector).get_by_role("button", name=words, exact=True).click()
 
 
-def _pupil(visitors: Visitors, server: Server, code: str, name: str, on_map: bool = False) -> Visitor:
-    """Types the code on the start page, then a name."""
-    pupil = visitors(on_map=on_map)
+def _pupil(visitors: Visitors, server: Server, code: str, name: str) -> Visitor:
+    """Types the code on the start page, then a name, and works on the map."""
+    pupil = visitors(on_map=True)
     pupil.page.goto(server.url)
     pupil.page.locator("esk-landing").get_by_label("Join code or link").fill(code)
     _press(pupil, "esk-landing", "Join")
@@ -112,7 +112,7 @@ def test_a_lesson_with_copies(visitors: Visitors, server: Server) -> None:
     code = made["code"]
     assert teacher.page.locator("esk-wall .letters").first.inner_text().replace(" ", "") == code
     ada = _pupil(visitors, server, code, "Ada")
-    ben = _pupil(visitors, server, code, "Ben", on_map=True)
+    ben = _pupil(visitors, server, code, "Ben")
     assert ada.page.url != ben.page.url
     for pupil, height in ((ada, 120), (ben, 60)):
         draw(pupil, "b", arch(on_screen(pupil, 1000, 2000), on_screen(pupil, 2600, 2200), height))
@@ -155,7 +155,7 @@ def test_everybody_looks_and_comes_back(visitors: Visitors, server: Server) -> N
     terrain, secret = server.create(title="Look at this")
     made = json.loads(server.request("POST", f"/api/terrains/{terrain}/classes", {}, secret))
     ada = _pupil(visitors, server, made["code"], "Ada")
-    ben = _pupil(visitors, server, made["code"], "Ben", on_map=True)
+    ben = _pupil(visitors, server, made["code"], "Ben")
     draw(ada, "b", arch(on_screen(ada, 1000, 2000), on_screen(ada, 2600, 2200), 80))
     own, path = ben.page.url, f"/api/terrains/{terrain}/classes/{made['id']}/show"
     server.request("POST", path, {"number": 1}, secret)
