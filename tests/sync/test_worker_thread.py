@@ -63,7 +63,7 @@ class Turnstile:
 
     def steps(self, *what: Any, **more: Any) -> Iterator[SolveEvent]:
         made = self._steps(*what, **more)
-        return Early(made) if self.previews_early else made
+        return WithEarlyPreviews(made) if self.previews_early else made
 
     def _steps(
         self, strokes: Sequence[c.Stroke], settings: c.TerrainSettings, levels: int | None = None, **_: Any
@@ -92,7 +92,7 @@ class Turnstile:
         raise AssertionError(f"nobody was given {basis}")
 
 
-class Early:
+class WithEarlyPreviews:
     """A solve that can show the coarsest level of newer strokes."""
 
     def __init__(self, made: Iterator[SolveEvent]) -> None:
@@ -157,8 +157,7 @@ class Bench:
 
     def _rests(self) -> bool:
         with self.worker._changed:
-            grounds = self.worker._grounds.values()
-            return all(states.stage(each, self.now) is None or states.is_resting(each, self.now) for each in grounds)
+            return all(states.stage(ground, self.now) is None for ground in self.worker._grounds.values())
 
     def stop(self) -> None:
         self.solver.permits.release(100)

@@ -221,17 +221,14 @@ def _slice(ground: Ground, now: float) -> Result:
         channels = replace(ground.channels, solved_since=True)
         early, state = replace(ground.early, solved_since=True), ground.state
         if isinstance(state, Previewing) and state.reached >= 0:
-            state = replace(state, finer=True, came=_came(ground, now))
+            state = replace(state, finer=True, came=_came(state, states.rests_until(ground), now))
         return replace(ground, state=state, channels=channels, early=early), (does.Step(),)
     return ground, (does.Refine(),) if isinstance(ground.state, Refining) else ()
 
 
-def _came(ground: Ground, now: float) -> Mapping[int, float]:
+def _came(pass_: Previewing, rested_until: float, now: float) -> Mapping[int, float]:
     """When each level came, for a pass that goes on: it took no time while it rested."""
-    state = ground.state
-    assert isinstance(state, Previewing)
-    rested = min(now, states.rests_until(ground)) - state.came.get(0, now)
-    return {**state.came, 0: state.came[0] + rested} if rested > 0 else state.came
+    return pass_.came if 0 not in pass_.came else {**pass_.came, 0: max(pass_.came[0], min(now, rested_until))}
 
 
 def _slice_beside(ground: Ground) -> Result:
