@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 import urllib.error
@@ -17,6 +15,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from esker.api.live.client import LiveTerrain
+from tests import zygote
 from tests.browser import free_port
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -34,7 +33,7 @@ class NodeProcess:
         self.port = free_port()
         self.line = self.port
         """The port at which the other nodes reach it."""
-        self.process: subprocess.Popen[bytes] | None = None
+        self.process: zygote.Process | None = None
         folder.mkdir(parents=True, exist_ok=True)
 
     @property
@@ -42,15 +41,9 @@ class NodeProcess:
         return f"http://127.0.0.1:{self.port}"
 
     def start(self) -> None:
-        command = [sys.executable, "-m", "tests.cluster.node_child", self.folder, str(self.port), self.name, self.url]
-        with (self.folder / "log").open("ab") as log:
-            self.process = subprocess.Popen(
-                [*map(str, command), *([str(self.hours)] if self.hours else [])],
-                cwd=ROOT,
-                env={**os.environ, "ESKER_CLUSTER_KEY": KEY, LINE: str(self.line)},
-                stdout=log,
-                stderr=log,
-            )
+        arguments = [str(self.folder), str(self.port), self.name, self.url, *([str(self.hours)] if self.hours else [])]
+        environment = {"ESKER_CLUSTER_KEY": KEY, LINE: str(self.line)}
+        self.process = zygote.start("tests.cluster.node_child", arguments, environment, self.folder / "log")
 
     def ready(self) -> None:
         """Waits until the node takes people."""

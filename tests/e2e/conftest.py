@@ -6,8 +6,6 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 import urllib.error
 import urllib.request
@@ -19,6 +17,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Error, Page, Playwright, sync_playwright
 
+from tests import zygote
 from tests.browser import FLAGS, chromium_path, draw_politely, free_port
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -97,7 +96,7 @@ class Server:
     options: tuple[str, ...] = ()
     environment: dict[str, str] = field(default_factory=dict)
     level: int = LEVEL
-    process: subprocess.Popen[bytes] | None = None
+    process: zygote.Process | None = None
 
     @property
     def url(self) -> str:
@@ -105,15 +104,9 @@ class Server:
 
     def start(self) -> None:
         """Start and wait until /healthz answers. Raises RuntimeError with the log when it does not."""
-        command = [sys.executable, "-m", "esker", "serve", "--port", str(self.port), "--data", str(self.data)]
-        with (self.data.parent / "server.log").open("ab") as log:
-            self.process = subprocess.Popen(
-                [*command, *self.options],
-                cwd=ROOT,
-                env=os.environ | {"ESKER_LEVEL": str(self.level)} | NO_PREVIEWS | self.environment,
-                stdout=log,
-                stderr=log,
-            )
+        arguments = ["serve", "--port", str(self.port), "--data", str(self.data), *self.options]
+        environment = {"ESKER_LEVEL": str(self.level)} | NO_PREVIEWS | self.environment
+        self.process = zygote.start("esker", arguments, environment, self.data.parent / "server.log")
         deadline = time.monotonic() + 300  # the first start of a machine compiles, beside whatever else it does
         while time.monotonic() < deadline:
             if self.process.poll() is not None:

@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import socket
-import subprocess
 import sys
 import time
 import urllib.error
@@ -27,6 +26,7 @@ from esker.store.engine.postgres import alone, engine
 from esker.store.engine.postgres.alone import WHOLE
 from esker.store.engine.postgres.leases import PostgresLeases
 from esker.store.journal import Journal
+from tests import zygote
 from tests.store.engines import Database, postgres
 from tests.sync.harness import LiveServer
 
@@ -48,14 +48,8 @@ class Served:
 
     def start(self) -> None:
         """Starts it, and returns when it serves."""
-        command = [sys.executable, "-m", "esker", "serve", "--port", str(self._port), "--level", "1"]
-        self.process = subprocess.Popen(
-            [*command, "--device", "numpy", "--data", str(self._data)],
-            cwd=ROOT,
-            env={**os.environ, "ESKER_DATABASE": self._url},
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
+        arguments = ["serve", "--port", str(self._port), "--level", "1", "--device", "numpy", "--data", str(self._data)]
+        self.process = zygote.start("esker", arguments, {"ESKER_DATABASE": self._url}, Path(os.devnull))
         end = time.monotonic() + 120
         while time.monotonic() < end and self.process.poll() is None:
             with suppress(OSError), urllib.request.urlopen(f"{self.base}/healthz", timeout=5) as answer:
