@@ -19,7 +19,7 @@ from esker.synthesis.rules import gullies
 from esker.synthesis.rules.targets import tie
 from esker.synthesis.site import BORDER, Biases, Site
 
-PARTS: Final = ("tile", "synth_hash", "synth_interpolate", "synth_site", "synth_targets", "synth_gullies")
+PARTS: Final = ("tiles/tile", *(f"synthesis/{name}" for name in ("hash", "interpolate", "site", "targets", "gullies")))
 SLOT: Final = TILE_SAMPLES + 2 * BORDER
 """Samples along one side of a slot."""
 AREA: Final = SLOT * SLOT
@@ -54,7 +54,7 @@ def source(*names: str) -> str:
 
 
 def site_words(site: Site, bits: int, varied: bool, biased: bool) -> NDArray[np.uint32]:
-    """``SynthSite`` of synth_site.wgsl: gpu/synthesis/site.ts in Python."""
+    """``SynthSite`` of synthesis/site.wgsl: gpu/synthesis/site.ts in Python."""
     look, sea = site.look_rule, site.sea_level_m
     head = [site.size_m, site.amplitude_m, site.zero_m, 0.0 if sea is None else 1.0, *look]
     words = [
@@ -151,7 +151,7 @@ class SlotMaker:
         values, bits, varied, biased = channel_values(site)
         channels = self.device.create_buffer_with_data(data=values, usage=usage.STORAGE)
         words = self.device.create_buffer_with_data(data=site_words(site, bits, varied, biased), usage=usage.UNIFORM)
-        code = source(*PARTS, f"rule_{site.rule}", "synth_slots", "compute_synthesis")
+        code = source(*PARTS, f"synthesis/rule_{site.rule}", "synthesis/slots", "synthesis/synthesise")
         module = self.device.create_shader_module(code=code)
         layout = self.device.create_pipeline_layout(bind_group_layouts=[self._layout])
         self._pipelines = {
@@ -191,10 +191,10 @@ class SlotMaker:
         self.device.queue.write_buffer(self.jobs, 0, words)
 
     def bounds(self, jobs: Sequence[Job]) -> NDArray[np.float32]:
-        """Returns what compute_bounds.wgsl finds in tiles that were made: (tiles, 4, 4, 4), sub-patch rows from the
+        """Returns what tiles/bounds.wgsl finds in tiles that were made: (tiles, 4, 4, 4), sub-patch rows from the
         south."""
         if self._bounds is None:
-            module = self.device.create_shader_module(code=source("tile", "compute_bounds"))
+            module = self.device.create_shader_module(code=source("tiles/tile", "tiles/bounds"))
             self._bounds = self.device.create_compute_pipeline(
                 layout="auto", compute={"module": module, "entry_point": "compute_bounds"}
             )

@@ -58,7 +58,7 @@ const OVERLAY_DIFFERENCE: u32 = 8u;
 @group(0) @binding(2) var slopes: texture_2d_array<f32>;
 @group(0) @binding(3) var light: texture_2d_array<f32>;
 @group(0) @binding(4) var sky_lut: texture_2d<f32>;
-@group(0) @binding(5) var<uniform> skylight: array<vec4f, 8>;  // compute_sky.wgsl, bake_ambient
+@group(0) @binding(5) var<uniform> skylight: array<vec4f, 8>;  // sky/tables.wgsl, bake_ambient
 @group(0) @binding(6) var noise: texture_2d<f32>;
 @group(0) @binding(7) var smooth_clamp: sampler;
 @group(0) @binding(8) var smooth_repeat: sampler;
@@ -66,8 +66,8 @@ const OVERLAY_DIFFERENCE: u32 = 8u;
 @group(0) @binding(10) var attributes0: texture_2d_array<f32>;  // synthesised: snow, wet, foam, smoothness / 2
 @group(0) @binding(11) var attributes1: texture_2d_array<f32>;  // grass, forest, grain, size of the next level's detail
 @group(0) @binding(12) var stones: texture_2d<f32>;  // stones_rich.wgsl
-@group(0) @binding(13) var lake_map: texture_2d<f32>;  // over the domain, metres: ground and level of a sample (lakes.wgsl)
-@group(0) @binding(14) var river_map: texture_2d<f32>;  // rivers.wgsl
+@group(0) @binding(13) var lake_map: texture_2d<f32>;  // over the domain, metres: ground and level of a sample (water/lakes.wgsl)
+@group(0) @binding(14) var river_map: texture_2d<f32>;  // water/rivers.wgsl
 
 // Clip position of a point given relative to the eye.
 fn clip_of(relative: vec3f) -> vec4f {

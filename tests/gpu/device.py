@@ -121,7 +121,7 @@ def store(fmt: str) -> dict[str, Any]:
 
 
 def job_list(size: float, jobs: list[tuple[int, int, int, int]]) -> NDArray[np.uint32]:
-    """`JobList` of compute_normals.wgsl: jobs are (slot, level, x, y)."""
+    """`JobList` of tiles/normals.wgsl: jobs are (slot, level, x, y)."""
     words = np.zeros(4 + 4 * 1024, np.uint32)
     words[:1] = np.array([size], np.float32).view(np.uint32)
     words[1] = len(jobs)
@@ -132,7 +132,7 @@ def job_list(size: float, jobs: list[tuple[int, int, int, int]]) -> NDArray[np.u
 def sun_list(
     size: float, high: float, sun: tuple[float, float, float, float], jobs: list[tuple[int, int, int, int]]
 ) -> NDArray[np.uint32]:
-    """`SunList` of compute_sun.wgsl: `sun` is the unit vector and the penumbra's tangent."""
+    """`SunList` of tiles/sun.wgsl: `sun` is the unit vector and the penumbra's tangent."""
     words = np.zeros(8 + 4 * 1024, np.uint32)
     words[0:1] = np.array([size], np.float32).view(np.uint32)
     words[1] = len(jobs)

@@ -1,4 +1,4 @@
-"""Scattering in the atmosphere in float64: the twin of shaders/wgsl/atmosphere.wgsl, with the integral that it fits.
+"""Scattering in the atmosphere in float64: twin of shaders/wgsl/sky/atmosphere.wgsl, with the integral that it fits.
 
 Hillaire, "A Scalable and Production Ready Sky and Atmosphere Rendering Technique" (2020): coefficients of table 1,
 multiple scattering by equations 5 to 10. Kilometres; radiance for a sun of irradiance 10 outside the atmosphere.

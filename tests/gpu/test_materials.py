@@ -10,8 +10,8 @@ from tests.gpu.device import open_device, source
 
 COUNT = 256
 MODULE = (
-    *("view", "tile", "sky", "material/noise", "tonemap", "material/detail_plain", "patch", "lakes"),
-    *("material/site", "material/shade"),
+    *("view", "tiles/tile", "sky/sky", "material/noise", "tonemap", "material/detail_plain"),
+    *("ground/patch", "water/lakes", "material/site", "material/shade"),
 )
 ENTRY = f"""
 @group(1) @binding(0) var<storage, read> asked: array<vec4f, {2 * COUNT}>;

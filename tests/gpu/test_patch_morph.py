@@ -37,7 +37,7 @@ def weigh(records: NDArray[np.uint32]) -> NDArray[np.float32]:
     """What the shader makes of patch records."""
     device = open_device()
     usage = wgpu.BufferUsage
-    module = device.create_shader_module(code=source("view", "tile", "patch") + ENTRY)
+    module = device.create_shader_module(code=source("view", "tiles/tile", "ground/patch") + ENTRY)
     pipeline = device.create_compute_pipeline(layout="auto", compute={"module": module, "entry_point": "weigh"})
     data = device.create_buffer_with_data(data=records.tobytes(), usage=usage.STORAGE)
     out = device.create_buffer(size=4 * len(records) * SIDE * SIDE, usage=usage.STORAGE | usage.COPY_SRC)

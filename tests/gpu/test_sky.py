@@ -34,7 +34,7 @@ def bake(elevation_deg: float) -> tuple[NDArray[np.float64], NDArray[np.float64]
     flags = wgpu.BufferUsage
     ambient = device.create_buffer(size=128, usage=flags.STORAGE | flags.COPY_SRC)
     job = device.create_buffer_with_data(data=np.array([*sun_at(elevation_deg), 0], np.float32), usage=flags.UNIFORM)
-    module = device.create_shader_module(code=source("atmosphere", "compute_sky"))
+    module = device.create_shader_module(code=source("sky/atmosphere", "sky/tables"))
     encoder = device.create_command_encoder()
     whole = {"buffer": ambient, "offset": 0, "size": 128}
     bindings = {
@@ -63,7 +63,7 @@ def bake(elevation_deg: float) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 
 def direction(col: int, row: int) -> NDArray[np.float64]:
-    """The direction that a texel stands for (`direction_of` in compute_sky.wgsl)."""
+    """The direction that a texel stands for (`direction_of` in sky/tables.wgsl)."""
     azimuth = 2 * math.asin(col / (WIDTH - 1))
     elevation = math.asin((row / (HEIGHT - 1)) ** 2)
     return np.array(

@@ -297,7 +297,7 @@ def test_bounds_of_sub_patches(detail: float, erosion: float) -> None:
 
 
 def drawn_parent(samples: NDArray[np.float32], east: int, north: int) -> NDArray[np.float32]:
-    """The parent's surface at the 65 x 65 samples of a child: `parent_height` of patch.wgsl."""
+    """The parent's surface at the 65 x 65 samples of a child: `parent_height` of ground/patch.wgsl."""
     at = np.arange(65)
     low, odd = at >> 1, at & 1
     rows, cols = low + 32 * north + BORDER, low + 32 * east + BORDER

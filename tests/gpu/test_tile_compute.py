@@ -39,7 +39,7 @@ def normals(atlas: TinyAtlas, slots: dict[Tile, int]) -> None:
         (HEIGHTS, atlas.view(atlas.heights)),
         (store("rgba16float"), atlas.view(atlas.slopes)),
     ]
-    atlas.run(source("tile", "compute_normals"), "compute_normals", bindings, len(jobs))
+    atlas.run(source("tiles/tile", "tiles/normals"), "compute_normals", bindings, len(jobs))
 
 
 def sunlight(atlas: TinyAtlas, slots: dict[Tile, int], high: float, sun: tuple[float, float, float, float]) -> None:
@@ -51,7 +51,7 @@ def sunlight(atlas: TinyAtlas, slots: dict[Tile, int], high: float, sun: tuple[f
         (READ, atlas.buffer(pages)),
         (store("rgba8unorm"), atlas.view(atlas.light)),
     ]
-    atlas.run(source("tile", "pages", "compute_sun"), "compute_sun", bindings, len(jobs))
+    atlas.run(source("tiles/tile", "tiles/pages", "tiles/sun"), "compute_sun", bindings, len(jobs))
 
 
 def sun_vector(azimuth_deg: float, elevation_deg: float) -> tuple[float, float, float, float]:
@@ -119,7 +119,7 @@ def bilinear(samples: NDArray[np.float32], x: FLOATS, y: FLOATS) -> FLOATS:
 
 
 def sun_twin(samples: NDArray[np.float32], high: float, sun: tuple[float, float, float, float]) -> FLOATS:
-    """`sun_visibility` of compute_sun.wgsl for the core samples of the level-0 tile, in float64."""
+    """`sun_visibility` of tiles/sun.wgsl for the core samples of the level-0 tile, in float64."""
     cell = SIZE / 64
     x, y = np.meshgrid(np.arange(65) * cell, np.arange(65) * cell)
     z0 = samples[CORE, CORE].astype(np.float64) + 0.02 * cell

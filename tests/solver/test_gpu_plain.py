@@ -32,7 +32,7 @@ def plain_launcher(tiles: Device) -> GpuLauncher:
     """Launches the plain kernels on the same queue."""
     assert tiles.plan is not None
     files = program_text.files()
-    texts = [files[name] for name in ("gpu_level.cl", "gpu_setup.cl", "gpu_plain.cl")]
+    texts = [files[name] for name in ("gpu/level.cl", "gpu/setup.cl", "gpu/plain.cl")]
     source = program_text.defines(gpu_program.defines(tiles.plan)) + "\n".join(texts)
     return GpuLauncher(replace(tiles, program=devices._compile(tiles.context, source, tiles.plan)))
 

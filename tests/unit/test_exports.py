@@ -271,7 +271,7 @@ def test_only_masks_sum_to_one(terrain: Terrain, tmp_path: Path) -> None:
 
 
 def inside_lake(lakes: Lakes, x: float, y: float, lake: float) -> float:
-    """The twin: ``inside_lake`` of shaders/wgsl/lakes.wgsl at a place in samples of the lakes' lattice."""
+    """The twin: ``inside_lake`` of shaders/wgsl/water/lakes.wgsl at a place in samples of the lakes' lattice."""
     n = len(lakes.levels)
     i, j = min(int(y), n - 2), min(int(x), n - 2)
     sides, covered, shore = [], False, True

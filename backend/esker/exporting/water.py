@@ -19,7 +19,7 @@ def under_water(
     """Returns which samples of ``heights`` (rows, columns), metres, lie under the sea or in a lake.
 
     ``u`` (columns,), ``v`` (rows,): where they lie in the lattice of the lakes, in its samples. A lake ends where
-    ``inside_lake`` of shaders/wgsl/lakes.wgsl does; where two meet in a cell the higher one counts.
+    ``inside_lake`` of shaders/wgsl/water/lakes.wgsl does; where two meet in a cell the higher one counts.
     """
     wet: NDArray[np.bool_] = np.zeros(heights.shape, dtype=bool) if sea_m is None else heights < np.float32(sea_m)
     if lakes is None or not lakes.any:

@@ -91,8 +91,8 @@ class Atlas:
 
 
 def attribute_texels(state: State, grain: Array) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """(69, 69, 4) each, as compute_synthesis.wgsl writes them: snow, wet, foam, h/2; grass, forest, grain, and 0 where
-    the page tells its selection of the next level."""
+    """(69, 69, 4) each, as synthesis/synthesise.wgsl writes them: snow, wet, foam, h/2; grass, forest, grain, and 0
+    where the page tells its selection of the next level."""
     pairs = (
         (state.snow, state.wet, state.foam, state.h / H_SCALE),
         (state.grass, state.forest, 0.5 + 0.5 * grain, np.zeros_like(grain)),

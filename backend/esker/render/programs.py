@@ -16,7 +16,7 @@ PITCH: Final = PATCH_CELLS + 1
 VERTICES_PER_DRAW: Final = 60_000
 """llvmpipe of Mesa 22 can take 65,536 tessellated vertices at once."""
 
-# Patches of water have a level of their own beside the record (water.wgsl).
+# Patches of water have a level of their own beside the record (water/water.wgsl).
 _RECORD_VERTEX: Final = """#version 430
 layout(location = 0) in uvec4 a_0;
 layout(location = 1) in vec4 a_1;

@@ -316,7 +316,7 @@ class Reference:
 
 
 class _Records:
-    """Patches of the cut on the device; see patch.wgsl for what the words are. ``seen``: which ones; ``water``: of
+    """Patches of the cut on the device; ground/patch.wgsl says what the words are. ``seen``: which ones; ``water``: of
     water, (n, 8)."""
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Rivers as shaders read them (twin of ``frontend/src/tiles/water/rivermap.ts``; shaders/wgsl/rivers.wgsl)."""
+"""Rivers as shaders read them (twin of ``frontend/src/tiles/water/rivermap.ts``; shaders/wgsl/water/rivers.wgsl)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 CELLS: Final = 128
 LATTICES: Final = 5
 COLUMNS: Final = 256
-"""RIVER_CELLS, RIVER_LATTICES and RIVER_COLUMNS of rivers.wgsl."""
+"""RIVER_CELLS, RIVER_LATTICES and RIVER_COLUMNS of water/rivers.wgsl."""
 WIDTH_M: Final = 2.7
 WIDTH_POWER: Final = 0.352
 BANK_M: Final = 4.0

@@ -9,25 +9,26 @@ from esker.resources import SHADERS
 from esker.wgsl.parse import parse
 from esker.wgsl.tree import Constant, Literal, Module
 
-_COMMON: Final = ("view", "tile", "sky", "material/noise", "tonemap")
+_COMMON: Final = ("view", "tiles/tile", "sky/sky", "material/noise", "tonemap")
 _GROUND: Final = tuple(f"material/{name}" for name in ("site", "rock", "growth", "snow", "wet"))
+_LINES: Final = "overlay/lines", "overlay/overlay"
 
 
 def terrain(look: str, detail: str) -> Module:
     """The ground in one look, for one of the two amounts of detail."""
     near = tuple(f"material/{name}" for name in (f"stones_{detail}", f"look_{look}", "shade"))
-    over = "rivers", "lines", "overlay", "difference", "terrain"
-    return _module(*_COMMON, _detail(detail), "patch", "lakes", *_GROUND, *near, *over)
+    over = "water/rivers", *_LINES, "overlay/difference", "ground/terrain"
+    return _module(*_COMMON, _detail(detail), "ground/patch", "water/lakes", *_GROUND, *near, *over)
 
 
 def wall(detail: str) -> Module:
     """The sides of the block."""
-    return _module(*_COMMON, _detail(detail), "patch", "wall")
+    return _module(*_COMMON, _detail(detail), "ground/patch", "ground/wall")
 
 
 def background(detail: str) -> Module:
     """Sea, sky and what lies around."""
-    return _module(*_COMMON, _detail(detail), "patch", "lines", "overlay", "lakes", "water", "background")
+    return _module(*_COMMON, _detail(detail), "ground/patch", *_LINES, "water/lakes", "water/water", "sky/background")
 
 
 def _detail(detail: str) -> str:
@@ -37,27 +38,27 @@ def _detail(detail: str) -> str:
 def scatter() -> Module:
     """Where trees, rocks and tufts of a picture stand."""
     stands = "instances/stands", "instances/scatter"
-    return _module(*_COMMON, _detail("plain"), "patch", "lakes", "pages", *stands)
+    return _module(*_COMMON, _detail("plain"), "ground/patch", "water/lakes", "tiles/pages", *stands)
 
 
 def instances() -> Module:
     """Trees, rocks and tufts."""
-    return _module(*_COMMON, _detail("plain"), "lines", "overlay", "instances/instances")
+    return _module(*_COMMON, _detail("plain"), *_LINES, "instances/instances")
 
 
 def normals() -> Module:
     """Gradients of tiles."""
-    return _module("tile", "compute_normals")
+    return _module("tiles/tile", "tiles/normals")
 
 
 def sun() -> Module:
     """Sun and sky visibility of tiles."""
-    return _module("tile", "pages", "compute_sun")
+    return _module("tiles/tile", "tiles/pages", "tiles/sun")
 
 
 def sky() -> Module:
     """Tables of the sky."""
-    return _module("atmosphere", "compute_sky", contract=False)
+    return _module("sky/atmosphere", "sky/tables", contract=False)
 
 
 def number(module: Module, name: str) -> int:

@@ -1,7 +1,7 @@
 /**
  * How far a ground is from a target, as one number a place: 0 far too low, 0.5 as asked, 1 far too high. Pure.
  *
- * What lies within the tolerance is as asked. `difference.wgsl` has the same colours.
+ * What lies within the tolerance is as asked. `overlay/difference.wgsl` has the same colours.
  */
 
 import { TOLERANCES_OFF } from "../generated/contract.ts";

@@ -47,7 +47,7 @@ describe("difference (SPEC L109)", () => {
   });
 
   it("has the colours of the shader", () => {
-    const shader = readFileSync("../shaders/wgsl/difference.wgsl", "utf8");
+    const shader = readFileSync("../shaders/wgsl/overlay/difference.wgsl", "utf8");
     expect(shader).toContain("core/difference.ts");
     expect(shader).toContain("fn difference_tint");
   });

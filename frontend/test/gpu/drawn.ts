@@ -1,4 +1,4 @@
-/** What a cut draws, computed on the CPU from the held tiles: twin of patch.wgsl, and a small rasteriser. */
+/** What a cut draws, computed on the CPU from the held tiles: twin of ground/patch.wgsl, and a small rasteriser. */
 
 import type { CameraState, TileView } from "../../src/core/types.ts";
 import { PATCH_CELLS, TILE_CELLS, TILE_SAMPLES } from "../../src/generated/contract.ts";
@@ -93,7 +93,7 @@ export function drawnPatch(cut: Cut, index: number, sizeM: number, height: Sampl
   };
 }
 
-/** Cells from an edge on which corners count (patch.wgsl). */
+/** Cells from an edge on which corners count (ground/patch.wgsl). */
 const EDGE_BAND = 2;
 
 /** Weight of a vertex from the weights of the corners (south-west, south-east, north-west, north-east) and the patch's own. */

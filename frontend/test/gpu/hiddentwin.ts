@@ -1,4 +1,4 @@
-/** Twin of hidden.wgsl in float64, and its comparison with the device on pictures of depth made up for it (SPEC R59). */
+/** Twin of hidden/hidden.wgsl in float64, and its comparison with the device on pictures of depth made up for it (SPEC R59). */
 
 import { eyeProjection, reversedDepth } from "../../src/core/camera/projection.ts";
 import type { CameraState } from "../../src/core/types.ts";

@@ -1,6 +1,6 @@
 /** What the host tells the synthesis (SPEC R18, R26, R29). */
 
-import synthSite from "@shaders/wgsl/synth_site.wgsl?raw";
+import synthSite from "@shaders/wgsl/synthesis/site.wgsl?raw";
 import { describe, expect, it } from "vitest";
 import vectors from "../../../tests/vectors/synthesis.json";
 import type { ChannelGrid, ChannelView } from "../../src/core/types.ts";

@@ -1,6 +1,6 @@
 """Levels on a GPU: memory, kernel launches, reading back (DESIGN 5.3). State that can be rebuilt.
 
-Layout (shaders/opencl/gpu_level.cl): a level is n rows of ``pitch`` floats, a multiple of 32, sample 0 first; channels
+Layout (shaders/opencl/gpu/level.cl): a level is n rows of ``pitch`` floats, a multiple of 32, sample 0 first; channels
 lie behind each other. Level 0's buffers also hold the levels below it, which the bottom kernels alone touch.
 """
 

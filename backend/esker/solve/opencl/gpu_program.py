@@ -57,7 +57,7 @@ class Tile:
 
 @dataclass(frozen=True)
 class Strip:
-    """What one work-group of a marching visit does (``gpu_march.cl``): a strip of columns, ``rows`` of them."""
+    """What one work-group of a marching visit does (``gpu/march.cl``): a strip of columns, ``rows`` of them."""
 
     rows: int
 
@@ -135,10 +135,10 @@ def defines(of: Plan) -> dict[str, float | int]:
 
 SCALAR = "#define SECTION_SCALAR"
 """Cross-sections of one sample, not of sixteen."""
-SOURCES = ("gpu_level.cl", "gpu_setup.cl", "gpu_bottom.cl", "nearest.cl", "section.cl", "gpu_raster.cl")
-OVER_SOURCES = ("gpu_level.cl", "nearest.cl", "section.cl", "gpu_raster.cl", "gpu_over_base.cl")
-VISIT = "gpu_visit.cl"
-MARCHING = "gpu_march.cl"
+SOURCES = ("gpu/level.cl", "gpu/setup.cl", "gpu/bottom.cl", "nearest.cl", "section.cl", "gpu/raster.cl")
+OVER_SOURCES = ("gpu/level.cl", "nearest.cl", "section.cl", "gpu/raster.cl", "gpu/over_base.cl")
+VISIT = "gpu/visit.cl"
+MARCHING = "gpu/march.cl"
 
 
 def over_source(files: dict[str, str]) -> str:

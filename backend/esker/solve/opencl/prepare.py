@@ -27,7 +27,6 @@ from typing import Any, Final
 import psutil
 
 from esker.process import caches, system
-from esker.resources import SHADERS
 from esker.solve.opencl import program_text
 from esker.solve.opencl.pocl import cpu, home
 
@@ -349,21 +348,15 @@ def machine_code(program: Any) -> None:
 # --- what is kept ---------------------------------------------------------------------------------------------------
 
 
-def _texts() -> str:
-    return "".join(path.read_text(encoding="utf-8") for path in sorted((SHADERS / "opencl").glob("*.cl")))
-
-
 def expected() -> int:
     """About how many kernels there are to compile, for a line that says how far it is."""
     names = [*program_text.SOURCES, *program_text.OVER_SOURCES, "patchwork.cl", "patchwork.cl"]
-    return sum(
-        len(re.findall(r"\bkernel\s", (SHADERS / "opencl" / name).read_text(encoding="utf-8"))) for name in names
-    )
+    return sum(len(re.findall(r"\bkernel\s", program_text.files()[name])) for name in names)
 
 
 def key() -> str:
     """Returns all that compiled kernels depend on beside the level: sources, constants, versions, kind of kernels."""
-    parts = [program_text.sources(), _texts(), os.environ.get("ESKER_KERNELS", "")]
+    parts = [program_text.sources(), "".join(program_text.files().values()), os.environ.get("ESKER_KERNELS", "")]
     for package in ("pyopencl", "pocl-binary-distribution"):
         with contextlib.suppress(PackageNotFoundError):
             parts.append(version(package))

@@ -27,8 +27,9 @@ def shader_folder() -> Path:
 
 @lru_cache(maxsize=1)
 def files() -> dict[str, str]:
-    """The kernels' files by name."""
-    return {path.name: path.read_text(encoding="utf-8") for path in sorted(shader_folder().glob("*.cl"))}
+    """The kernels' files by name, with the folder that they lie in."""
+    found = sorted(shader_folder().rglob("*.cl"))
+    return {path.relative_to(shader_folder()).as_posix(): path.read_text(encoding="utf-8") for path in found}
 
 
 def sources() -> str:

@@ -114,7 +114,7 @@ export class Atlas implements Slots {
     this.state = buffer("atlas state", this.capacity * stateBytes);
     this.pages = buffer("atlas pages", this.#pageTable.words.byteLength);
     this.#bySlot = new Array<Resident | undefined>(this.capacity).fill(undefined);
-    // Slot 0 is the root's for good: the water outside the domain reads it (water.wgsl).
+    // Slot 0 is the root's for good: the water outside the domain reads it (water/water.wgsl).
     for (let slot = this.capacity - 1; slot > 0; slot -= 1) this.#free.push(slot);
   }
 

@@ -1,6 +1,6 @@
 /**
  * Bounds of synthesised ground for the selection: a reduction on the device, read back in batches and never waited for
- * (DESIGN 10; paper 1, section 3.3). Shader: compute_bounds.wgsl.
+ * (DESIGN 10; paper 1, section 3.3). Shader: tiles/bounds.wgsl.
  */
 
 import { SUBPATCHES } from "../../generated/contract.ts";

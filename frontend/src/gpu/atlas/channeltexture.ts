@@ -1,5 +1,5 @@
 /**
- * One small texture over the whole domain, which the ground's overlays read (rgba8unorm; `detail_at` in terrain.wgsl):
+ * One small texture over the whole domain, which the ground's overlays read (rgba8unorm; `detail_at` in ground/terrain.wgsl):
  * noise amplitude, roughness, where the selected stroke is felt, a channel is painted or a watershed lies, and how far contours show.
  */
 

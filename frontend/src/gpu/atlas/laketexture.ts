@@ -1,5 +1,5 @@
 /**
- * The lake texture, which shaders read (lakes.wgsl): ground and level of each sample of the domain, rg32float, metres.
+ * The lake texture, which shaders read (water/lakes.wgsl): ground and level of each sample of the domain, rg32float, metres.
  */
 
 import { LAKE_SIDE, type Lakes } from "../../tiles/lakes/lakes.ts";

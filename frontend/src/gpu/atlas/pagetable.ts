@@ -1,6 +1,6 @@
 /**
  * Slot of a tile, for shaders that walk over the ground: a hash table with open addressing, so that its size follows the
- * atlas and not the number of tiles that a level could have. `page` in shaders/wgsl/pages.wgsl reads it.
+ * atlas and not the number of tiles that a level could have. `page` in shaders/wgsl/tiles/pages.wgsl reads it.
  *
  * An entry is two words: column | level << 17, and row | slot << 17.
  */

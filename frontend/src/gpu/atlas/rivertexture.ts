@@ -1,4 +1,4 @@
-/** The texture of rivers, which shaders read (rivers.wgsl; tiles/water/rivermap.ts makes its texels). */
+/** The texture of rivers, which shaders read (water/rivers.wgsl; tiles/water/rivermap.ts makes its texels). */
 
 import type { RiverMap } from "../../core/types.ts";
 import { RIVER_COLUMNS } from "../../tiles/water/rivermap.ts";

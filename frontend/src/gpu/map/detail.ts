@@ -50,14 +50,14 @@ export class DetailPicture {
   }
 }
 
-/** The colours of influence_tint in overlay.wgsl. */
+/** The colours of influence_tint in overlay/overlay.wgsl. */
 const FELT_FAR: Rgb = [0xc9, 0xb8, 0x6e];
 const FELT_NEAR: Rgb = [0xd3, 0x5a, 0x3c];
 
 /** The colour of a watershed on the map. */
 const SHED: Rgb = [0x2f, 0x72, 0xb8];
 
-/** The colours of painted_tint in overlay.wgsl and of ui/panels/legend.ts. */
+/** The colours of painted_tint in overlay/overlay.wgsl and of ui/panels/legend.ts. */
 const LESS: Rgb = [0xb3, 0x74, 0x42];
 const MORE: Rgb = [0x35, 0x95, 0xb3];
 

@@ -1,4 +1,4 @@
-/** Sky, and the plane or sea around the block (shaders/wgsl/background.wgsl). */
+/** Sky, and the plane or sea around the block (shaders/wgsl/sky/background.wgsl). */
 
 import { sceneSource } from "../shaders.ts";
 import { createPass, type PassContext } from "./pipeline.ts";

@@ -1,4 +1,4 @@
-/** Drops of rain as small discs on the ground (shaders/wgsl/drops.wgsl). */
+/** Drops of rain as small discs on the ground (shaders/wgsl/water/drops.wgsl). */
 
 import type { DropsVisual } from "../../core/types.ts";
 import { SOURCES } from "../shaders.ts";

@@ -1,4 +1,4 @@
-/** The plane that is being drawn on (shaders/wgsl/ghost.wgsl). */
+/** The plane that is being drawn on (shaders/wgsl/marks/ghost.wgsl). */
 
 import type { GhostVisual } from "../../core/types.ts";
 import { SOURCES } from "../shaders.ts";

@@ -8,7 +8,7 @@
  *
  * A box is that of the bounds that the selection culls with, so no sample that is left out would have passed the depth test:
  * pictures are the same. What was found stays with the node of the patch tree, from frame to frame; a page that serves again
- * brings a wrong guess at worst, which costs time alone. The shader is shaders/wgsl/hidden.wgsl.
+ * brings a wrong guess at worst, which costs time alone. The shader is shaders/wgsl/hidden/hidden.wgsl.
  */
 
 import { FACT_WORDS, RECORD_WORDS } from "../../tiles/patches/records.ts";

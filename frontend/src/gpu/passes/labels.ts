@@ -1,4 +1,4 @@
-/** Heights on the index contours while the contour overlay is shown (tiles/contourlabels.ts, shaders/wgsl/label.wgsl). */
+/** Heights on the index contours while the contour overlay is shown (tiles/contourlabels.ts, shaders/wgsl/marks/label.wgsl). */
 
 import type { CameraState, Scene } from "../../core/types.ts";
 import { type ContourLabel, contourLabels } from "../../tiles/contourlabels.ts";
@@ -101,7 +101,7 @@ export class LabelPass {
   }
 }
 
-/** One instance per letter (`LabelIn` in label.wgsl); places relative to the eye, subtracted in float64. */
+/** One instance per letter (`LabelIn` in marks/label.wgsl); places relative to the eye, subtracted in float64. */
 export function letterInstances(
   labels: readonly ContourLabel[],
   camera: CameraState,

@@ -1,4 +1,4 @@
-/** The coarse relief of a grid that is being placed (shaders/wgsl/placing.wgsl). */
+/** The coarse relief of a grid that is being placed (shaders/wgsl/marks/placing.wgsl). */
 
 import type { PlacingVisual } from "../../core/types.ts";
 import { SOURCES } from "../shaders.ts";

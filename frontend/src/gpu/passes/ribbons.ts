@@ -1,4 +1,4 @@
-/** Strokes, and the shadow of the stroke under way, as ribbons of constant width (shaders/wgsl/ribbon.wgsl). */
+/** Strokes, and the shadow of the stroke under way, as ribbons of constant width (shaders/wgsl/marks/ribbon.wgsl). */
 
 import type { FootprintVisual, GhostVisual, Rgba, StrokeVisual } from "../../core/types.ts";
 import { SOURCES } from "../shaders.ts";

@@ -1,4 +1,4 @@
-/** The sky tables, baked on the GPU whenever the sun moves (shaders/wgsl/compute_sky.wgsl). */
+/** The sky tables, baked on the GPU whenever the sun moves (shaders/wgsl/sky/tables.wgsl). */
 
 import type { Vec3 } from "../../core/types.ts";
 import { SOURCES } from "../shaders.ts";

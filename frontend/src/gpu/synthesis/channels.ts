@@ -1,5 +1,5 @@
 /**
- * Channels as the synthesis reads them, all on one grid (compute_synthesis.wgsl, channel_value): what strokes ask of
+ * Channels as the synthesis reads them, all on one grid (synthesis/synthesise.wgsl, channel_value): what strokes ask of
  * the detail, and the data level that holds it back.
  */
 

@@ -1,4 +1,4 @@
-/** The settings of the synthesis as its shaders read them: `SynthSite` in shaders/wgsl/synth_site.wgsl. */
+/** The settings of the synthesis as its shaders read them: `SynthSite` in shaders/wgsl/synthesis/site.wgsl. */
 
 import type { Look, Place, Rule } from "../../generated/contract.ts";
 import {

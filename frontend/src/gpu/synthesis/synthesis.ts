@@ -1,6 +1,6 @@
 /**
  * Detail on the device (DESIGN 10, docs/renderer.md "Synthesis"): makes ground and attributes of atlas slots from those of
- * their parents' slots. Shaders: compute_synthesis.wgsl, synth_*.wgsl and one rule_*.wgsl a rule.
+ * their parents' slots. Shaders: synthesis/synthesise.wgsl, one rule_*.wgsl a rule.
  *
  * A slot is filled in two steps. The atlas writes the samples that are *held* into `grounds` (guide, base; metres): from
  * the tile itself and from any of its eight neighbours on the level, one owner per shared sample (apron.ts). Then a job with
@@ -41,7 +41,7 @@ export interface SynthesisJob {
 
 /**
  * The part of the atlas that the passes use: the samples of all slots. Textures are 2d-arrays in its layout
- * (tile.wgsl).
+ * (tiles/tile.wgsl).
  */
 export interface SynthesisAtlas {
   /** vec2f per sample: guide, base; metres. STORAGE | COPY_DST. */

@@ -219,7 +219,7 @@ function spread(
 
 /**
  * Level of the lake that covers a place if the ground there lies below it, else NO_LAKE; `u` from west to east and `v` from
- * south to north, 0..1. A lake ends where the ground outside its basin falls below it (lakes.wgsl, inside_lake).
+ * south to north, 0..1. A lake ends where the ground outside its basin falls below it (water/lakes.wgsl, inside_lake).
  */
 export function lakeOver({ side, heights, levels }: Lakes, u: number, v: number): number {
   const [x, y] = [u * (side - 1), v * (side - 1)];

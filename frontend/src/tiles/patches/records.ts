@@ -1,4 +1,4 @@
-/** The patches of a cut as the device reads them (shaders/wgsl/patch.wgsl). */
+/** The patches of a cut as the device reads them (shaders/wgsl/ground/patch.wgsl). */
 
 export const EDGE_WEST = 1;
 export const EDGE_EAST = 2;
@@ -6,13 +6,13 @@ export const EDGE_SOUTH = 4;
 export const EDGE_NORTH = 8;
 
 /**
- * Uint32 words of a patch record; the vertex shader reads the same (patch.wgsl): column of the south-west vertex in samples
+ * Uint32 words of a patch record; the vertex shader reads the same (ground/patch.wgsl): column of the south-west vertex in samples
  * of its level | edge bits << 24 | border bits << 28; row | level << 24 | (1 << 31 where some of it lies below the sea);
  * own slot | parent slot << 12 | own morph weight as unorm8 << 24; four morph weights of the corners as unorm8 (south-west,
  * south-east, north-west, north-east).
  */
 export const RECORD_WORDS = 4;
-/** Words that say what is known of a patch beside what is drawn (Cut.facts, shaders/wgsl/hidden.wgsl). */
+/** Words that say what is known of a patch beside what is drawn (Cut.facts, shaders/wgsl/hidden/hidden.wgsl). */
 export const FACT_WORDS = 3;
 const INDEX_MASK = 0xffffff;
 /** Slots of the atlas have fewer bits. */

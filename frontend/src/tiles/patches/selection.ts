@@ -6,7 +6,7 @@
  * neighbour there is coarser: odd vertices snap) and a morph weight for each of its four corners. A weight is a property
  * of the corner's point, the same for all patches that meet there: 1 where one of them is coarser (all draw the parent's
  * sample), 0 where one is finer, else by screen error. Bilinear weights between the corners then agree along every
- * shared edge, so patches meet exactly. Away from its edges a patch has its own weight (patch.wgsl).
+ * shared edge, so patches meet exactly. Away from its edges a patch has its own weight (ground/patch.wgsl).
  */
 
 import type { CameraState, TileView } from "../../core/types.ts";

@@ -1,5 +1,5 @@
 /**
- * Rivers as shaders read them (shaders/wgsl/rivers.wgsl): for each cell of lattices over the domain the pieces of rivers that reach
+ * Rivers as shaders read them (shaders/wgsl/water/rivers.wgsl): for each cell of lattices over the domain the pieces of rivers that reach
  * into it, all in the texels of one texture (twin of `backend/esker/render/rivers.py`). Coarser lattices are for what is far away:
  * their pieces are longer, and reach further beyond their banks.
  */
@@ -7,7 +7,7 @@
 import type { RiverLine, RiverMap } from "../../core/types.ts";
 import { TILE_CELLS } from "../../generated/contract.ts";
 
-/** Cells of the finest lattice along a side, each further one has half as many; and texels in a row: as in rivers.wgsl. */
+/** Cells of the finest lattice along a side, each further one has half as many; and texels in a row: as in water/rivers.wgsl. */
 export const RIVER_CELLS = 128;
 export const RIVER_LATTICES = 5;
 export const RIVER_COLUMNS = 256;

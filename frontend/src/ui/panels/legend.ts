@@ -70,7 +70,7 @@ export class EskLegend extends SignalElement {
         justify-content: space-between;
         font-variant-numeric: tabular-nums;
       }
-      /* The colours of slope_tint and detail_tint in overlay.wgsl, as they look on lit ground. */
+      /* The colours of slope_tint and detail_tint in overlay/overlay.wgsl, as they look on lit ground. */
       .slope {
         background: linear-gradient(
           to right,

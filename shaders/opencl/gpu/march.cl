@@ -1,5 +1,5 @@
 // The fused level visit on a GPU for levels that fill it: the work-group marches north over a strip of columns, one row a
-// step, with all sweeps in flight behind each other. Twins: gpu_visit.cl (to the bit) and reference.visit.
+// step, with all sweeps in flight behind each other. Twins: gpu/visit.cl (to the bit) and reference.visit.
 //
 // This file is compiled several times: MARCH names the kernel, MARCH_CHANNELS says how many share d, MARCH_WIDTH work-items own a
 // column each. At step j the row j of the guess comes in, sweep k makes row j-1-k of its result, and the residual of row

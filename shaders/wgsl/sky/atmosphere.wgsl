@@ -1,6 +1,6 @@
 // Scattering in the earth's atmosphere: Rayleigh, Mie and ozone with the coefficients of Hillaire, "A Scalable and
 // Production Ready Sky and Atmosphere Rendering Technique" (2020), table 1. Kilometres inside. The result is baked into
-// small tables (compute_sky.wgsl), so its cost does not matter.
+// small tables (sky/tables.wgsl), so its cost does not matter.
 const PLANET_KM: f32 = 6360.0;
 const TOP_KM: f32 = 6460.0;
 const VIEWER_KM: f32 = 0.6;

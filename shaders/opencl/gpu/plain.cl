@@ -1,5 +1,5 @@
-// The plain twins of gpu_visit.cl and gpu_bottom.cl: one launch a stage, one work-item a sample, everything in global
-// memory. Tests hold the fused kernels against them, bit for bit; no solve runs them. After gpu_level.cl, gpu_setup.cl.
+// The plain twins of gpu/visit.cl and gpu/bottom.cl: one launch a stage, one work-item a sample, everything in global
+// memory. Tests hold the fused kernels against them, bit for bit; no solve runs them. After gpu/level.cl, gpu/setup.cl.
 // Levels below level 0 lie behind it in the same buffers: `at` and `under` are where a level and the next coarser one
 // begin. Global size of all: (columns, rows, channels), rounded up.
 

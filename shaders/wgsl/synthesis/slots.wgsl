@@ -14,7 +14,7 @@ struct SynthJob {
 @group(0) @binding(1) var<storage, read> jobs: array<SynthJob>;
 @group(0) @binding(2) var<storage, read_write> grounds: array<vec2f>;  // (guide, base), metres
 @group(0) @binding(3) var<storage, read_write> states: array<vec4u>;   // docs/synthesis.md, "State"
-@group(0) @binding(4) var<storage, read> channels: array<vec2f>;       // see channel_value in compute_synthesis.wgsl
+@group(0) @binding(4) var<storage, read> channels: array<vec2f>;       // see channel_value in synthesis/synthesise.wgsl
 @group(0) @binding(5) var heights_out: texture_storage_2d_array<r32float, write>;
 @group(0) @binding(6) var attributes0_out: texture_storage_2d_array<rgba8unorm, write>;
 @group(0) @binding(7) var attributes1_out: texture_storage_2d_array<rgba8unorm, write>;

@@ -187,7 +187,7 @@ fn packed(low: vec4f, high: vec4f) -> vec4u {
   return unorm16(low) | (unorm16(high) << vec4u(16u));
 }
 
-// Size of what finer levels add, for attributes: doublings of 2^-12 cells, sixteen of them (compute_bounds.wgsl undoes it).
+// Size of what finer levels add, for attributes: doublings of 2^-12 cells, sixteen of them (tiles/bounds.wgsl undoes it).
 fn finer_code(finer: vec4f, cell: f32) -> vec4f {
   return unit((log2(max(finer / cell, vec4f(1.0e-9))) + 12.0) / 16.0);
 }

@@ -1,5 +1,5 @@
 // Per 16-cell sub-patch of a tile: lowest and highest height, distance to the parent's surface as the morph draws it
-// (patch.wgsl, parent_height), and how far the surface of its children can be from its own. One workgroup a tile; four
+// (ground/patch.wgsl, parent_height), and how far the surface of its children can be from its own. One workgroup a tile; four
 // invocations a sub-patch, each every fourth row of its 17 x 17 samples.
 struct BoundsJob {
   slot: u32,

@@ -1,4 +1,4 @@
-// What the ground over a base owes to it, on a GPU; after gpu_level.cl. See over_base.cl. Twin: reference.over_base.
+// What the ground over a base owes to it, on a GPU; after gpu/level.cl. See over_base.cl. Twin: reference.over_base.
 
 inline float edge_over_base(cfield_t base, cfield_t share, cfield_t target, size_t at, size_t to, float slack) {
     float step = base[to] - base[at], one = share[at] * step, two = share[to] * step, fall = target[at] - target[to];

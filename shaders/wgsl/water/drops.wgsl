@@ -13,7 +13,7 @@ struct DropVertex {
 const DROP_PX: f32 = 1.7;
 const STREAK_PX: f32 = 7.0;
 
-// Towards the eye, as lines on the ground are (ribbon.wgsl).
+// Towards the eye, as lines on the ground are (marks/ribbon.wgsl).
 fn drop_clip(p: vec3f) -> vec4f {
   let away = distance(p, view.eye.xyz);
   let pull = min(0.004 * away + 0.0012 * view.size, 0.5 * away);

@@ -1,4 +1,4 @@
-// Light of a synthetic tile taken over from its parent, where marching it anew would cost too much (compute_sun.wgsl).
+// Light of a synthetic tile taken over from its parent, where marching it anew would cost too much (tiles/sun.wgsl).
 // Written beside the atlas, which cannot be read and written at once; the host copies it there.
 struct TakeJob {
   place: u32,   // slot of the scratch layer

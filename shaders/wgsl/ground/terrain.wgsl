@@ -39,7 +39,7 @@ fn detail_at(p: vec2f) -> vec4f {
   return textureSampleLevel(channels, smooth_clamp, (p / view.size * (side - 1.0) + 0.5) / side, 0.0);
 }
 
-// What lies and grows on the ground here (the words of compute_synthesis.wgsl).
+// What lies and grows on the ground here (the words of synthesis/synthesise.wgsl).
 fn cover_of(surface: Surface) -> Attributes {
   let a = surface.attributes0;
   let b = surface.attributes1;

@@ -1,5 +1,5 @@
 // What the rule is told of a place: settings (gpu/synthesis/site.ts writes them), the ground, what strokes ask for.
-// vec4f: the four children of a parent's cell, see synth_interpolate.wgsl.
+// vec4f: the four children of a parent's cell, see synthesis/interpolate.wgsl.
 struct SynthLevel {
   keys: vec4u,            // of the four streams of noise
   inverse_spacing: f32,   // of the samples that derivatives are taken from, 1/m: the parent's; level 0: its own

@@ -7,7 +7,7 @@ fn paper_backdrop(dir: vec3f) -> vec3f {
 
 fn sky_colour(dir: vec3f) -> vec3f {
   if (view.look == LOOK_PAPER) { return paper_backdrop(dir); }
-  // The mapping of compute_sky.wgsl, without a single arc function.
+  // The mapping of sky/tables.wgsl, without a single arc function.
   let flat = max(length(dir.xy), 1.0e-5);
   let sun_flat = max(length(view.sun.xy), 1.0e-5);
   let azimuth = sqrt(clamp(0.5 - 0.5 * dot(dir.xy, view.sun.xy) / (flat * sun_flat), 0.0, 1.0));
