@@ -18,7 +18,7 @@ from esker.cluster.passing import PASSED, Entrance, Passing
 from esker.cluster.signing import made_key
 from esker.fairness.spending import Account
 from esker.server.routes.elsewhere import Arrival
-from esker.server.run import _config
+from esker.server.serving import configured
 from esker.store.engine.leases import Leases
 
 KEY = made_key("the key that the nodes of a test have together")
@@ -82,7 +82,7 @@ class Machine:
         app = self._app()
         app.add_middleware(Passing, cluster=self.cluster, terrain_of=nowhere)
         app.add_middleware(Entrance, cluster=self.cluster)
-        self.server = uvicorn.Server(_config(app, lambda _: False, None))
+        self.server = uvicorn.Server(configured(app, lambda _: False, None))
         self.task: asyncio.Task[None] | None = None
 
     def _app(self) -> FastAPI:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from esker.server import run, starting
+from esker.server import serving, starting
 from esker.server.wire import websocket
 from tests.store.engines import sqlite
 from tests.sync.harness import LiveServer, Peer, raw_socket, set_op, sleeping_member, stroke
@@ -110,8 +110,8 @@ def test_the_history_goes_on_when_the_date_is_set_back(server: LiveServer) -> No
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A server that asks soon, and whose sockets hold little."""
-    monkeypatch.setattr(run, "PING_SECONDS", 0.4)
-    monkeypatch.setattr(run, "PONG_SECONDS", 0.4)
+    monkeypatch.setattr(serving, "PING_SECONDS", 0.4)
+    monkeypatch.setattr(serving, "PONG_SECONDS", 0.4)
     monkeypatch.setattr(starting, "SEND_BUFFER", 4096)
     monkeypatch.setattr(websocket, "FAREWELL_SECONDS", 0.2)
 
@@ -124,7 +124,7 @@ def _members(peer: Peer) -> set[str]:
 @pytest.mark.parametrize("waiting", [0, 30_000])
 def test_a_peer_that_just_stops_is_out_in_a_bounded_time(tmp_path: Path, waiting: int) -> None:
     """``waiting``: characters on their way to it, more than the kernel takes and less than makes the server wait."""
-    assert run.PING_SECONDS + run.PONG_SECONDS < 1
+    assert serving.PING_SECONDS + serving.PONG_SECONDS < 1
     with LiveServer(tmp_path, level=0) as server:
         terrain, secret = server.create()
         ana = server.join(terrain, secret, "ana")
@@ -147,7 +147,7 @@ def test_a_peer_that_just_stops_is_out_in_a_bounded_time(tmp_path: Path, waiting
 
 
 def test_the_defaults_keep_what_is_promised() -> None:
-    assert run.PING_SECONDS + run.PONG_SECONDS + websocket.FAREWELL_SECONDS <= LAST_ANSWER_TO_OUT
+    assert serving.PING_SECONDS + serving.PONG_SECONDS + websocket.FAREWELL_SECONDS <= LAST_ANSWER_TO_OUT
 
 
 def test_half_a_goodbye_is_one(server: LiveServer) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from esker import contract as c
-from esker.server.run import _front
+from esker.server.serving import front_of
 from esker.server.settings import Settings
 from esker.server.starting import CannotServe
 from esker.server.wire.front import Front, Proxies, hosts
@@ -43,7 +43,7 @@ def test_the_last_entry_that_is_no_proxy_counts(trusted: str, peer: str, fields:
 def test_a_proxy_that_is_no_address_is_refused_at_the_start() -> None:
     """SPEC P294."""
     with pytest.raises(CannotServe, match="ESKER_FORWARDED_ALLOW_IPS"):
-        _front(Settings(forwarded_allow_ips="caddy"), "127.0.0.1")
+        front_of(Settings(forwarded_allow_ips="caddy"), "127.0.0.1")
 
 
 def _against(front: Front, **fields: str) -> str:
@@ -82,11 +82,11 @@ def test_what_a_page_of_another_site_may_not(fields: dict[str, str], code: str) 
 
 def test_a_server_that_nobody_named_goes_by_any_name() -> None:
     """SPEC P295: but not for pages of other sites."""
-    front = _front(Settings(host="0.0.0.0"), "127.0.0.1")
+    front = front_of(Settings(host="0.0.0.0"), "127.0.0.1")
     assert _against(front, host="anything.example") == ""
     assert _against(front, host="anything.example", origin="https://evil.example") == "bad_origin"
-    assert _against(_front(Settings(), "127.0.0.1"), host="anything.example") == "bad_host"
-    assert _against(_front(Settings(hosts="anything.example"), "127.0.0.1"), host="anything.example") == ""
+    assert _against(front_of(Settings(), "127.0.0.1"), host="anything.example") == "bad_host"
+    assert _against(front_of(Settings(hosts="anything.example"), "127.0.0.1"), host="anything.example") == ""
 
 
 def _ask(server: LiveServer, method: str, path: str, **fields: str) -> tuple[int, Any, Any]:
@@ -142,4 +142,4 @@ def test_https_only_where_its_certificate_is_trusted_by_itself(tmp_path: Path) -
         assert _ask(server, "GET", "/healthz")[2]["Strict-Transport-Security"] is None
     with LiveServer(tmp_path / "b") as server:
         assert _ask(server, "GET", "/healthz", X_Forwarded_Proto="https")[2]["Strict-Transport-Security"] is None
-    assert not _front(Settings(lan=True, public_url="https://192.168.1.2:8000"), "192.168.1.2").strict
+    assert not front_of(Settings(lan=True, public_url="https://192.168.1.2:8000"), "192.168.1.2").strict

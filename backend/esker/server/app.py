@@ -100,29 +100,14 @@ def create_app(
         openapi_url="/api/openapi.json",
         lifespan=lifespan,
     )
-    app.add_middleware(Bodies)
-    if member is not None and member.rooms is not None:
-        app.add_middleware(Passing, cluster=member.cluster, terrain_of=member.rooms.terrain_of)
-    app.add_middleware(Gate, front=front)
-    app.add_middleware(Paced)
-    app.add_middleware(Headers, strict=front.strict)
-    app.add_middleware(Forwarded, front=front)
-    if cluster is not None:
-        app.add_middleware(Entrance, cluster=cluster)
+    _stand_before(app, front, member)
     classes = Classes(hub, grids)
     collections = Collections(classes, data / "collections")
     if member is not None and member.rooms is not None:
         member.rooms.jobs += [imports, exports, collections]
     app.state.hub = hub
     app.state.nodes = (lambda: 1) if cluster is None else (lambda: max(1, len(cluster.nodes)))
-    app.state.new_terrains = Rates(Rate(*NEW_TERRAINS), total=Rate(*ALL_NEW_TERRAINS))
-    app.state.uploads = Turns(AT_ONCE)
-    app.state.receiving = Places(UPLOADS)
-    app.state.code_tries = Rates(Rate(*CODE_TRIES))
-    app.state.new_codes = Rates(Rate(*NEW_CODES), link=Rate(*NEW_CODES))
-    app.state.new_links = Rates(Rate(*NEW_LINKS))
-    app.state.wrong_codes = Rates(total=Rate(*WRONG_CODES))
-    app.state.imports = Rates(Rate(*IMPORTS))
+    _allow(app)
     add_errors(app)
     add_imports(app, hub, grids, imports)
     add_terrains(app, hub, grids)
@@ -146,3 +131,28 @@ def create_app(
     add_previews(app, hub, pictures)
     add_page(app, hub, page, data, pictures)
     return app
+
+
+def _stand_before(app: FastAPI, front: Front, member: Member | None) -> None:
+    """Adds what each request passes before its route; who is added last is passed first."""
+    app.add_middleware(Bodies)
+    if member is not None and member.rooms is not None:
+        app.add_middleware(Passing, cluster=member.cluster, terrain_of=member.rooms.terrain_of)
+    app.add_middleware(Gate, front=front)
+    app.add_middleware(Paced)
+    app.add_middleware(Headers, strict=front.strict)
+    app.add_middleware(Forwarded, front=front)
+    if member is not None:
+        app.add_middleware(Entrance, cluster=member.cluster)
+
+
+def _allow(app: FastAPI) -> None:
+    """Adds what routes may be asked for: rates, and places for uploads."""
+    app.state.new_terrains = Rates(Rate(*NEW_TERRAINS), total=Rate(*ALL_NEW_TERRAINS))
+    app.state.uploads = Turns(AT_ONCE)
+    app.state.receiving = Places(UPLOADS)
+    app.state.code_tries = Rates(Rate(*CODE_TRIES))
+    app.state.new_codes = Rates(Rate(*NEW_CODES), link=Rate(*NEW_CODES))
+    app.state.new_links = Rates(Rate(*NEW_LINKS))
+    app.state.wrong_codes = Rates(total=Rate(*WRONG_CODES))
+    app.state.imports = Rates(Rate(*IMPORTS))

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
-import socket
-import ssl
 import sys
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Final
 
-import uvicorn
-
-from esker import contract as c
 from esker.document.ops import Limits
 from esker.exporting import run as exporting
 from esker.importing import run as importing
@@ -23,7 +17,6 @@ from esker.jobs.exports import Exports, Plant
 from esker.keeper.lesson import first_code, greeting, open_lesson
 from esker.keeper.private import Key, Private
 from esker.process import confinement, system
-from esker.process.garbage import Collector
 from esker.render.pictures.previews import Previews
 from esker.server import first_build
 from esker.server.app import create_app
@@ -32,14 +25,11 @@ from esker.server.hydrology import Hydrology, Snapshot, snapshot
 from esker.server.nodes import Member
 from esker.server.routes.metrics import Gauges
 from esker.server.routes.previews import Pictures
+from esker.server.serving import HttpServer, configured, front_of
 from esker.server.settings import Settings
 from esker.server.starting import CannotServe, FrontDoor, Stopping, WaitingRoom
 from esker.server.storing import Storing
-from esker.server.wire.door import BACKLOG, Door
-from esker.server.wire.front import Front, Proxies, hosts, local_names
-from esker.server.wire.http import Connections, HttpProtocol, bounded
 from esker.server.wire.tls import CA_FILE
-from esker.server.wire.websocket import WebSocketProtocol
 from esker.session.ground.ports import Solver, SolverFactory
 from esker.session.ground.recovery import LAST_RESORT, Fault
 from esker.session.ground.worker import Worker
@@ -62,24 +52,8 @@ from esker.tiles.watcher import Watcher
 
 log = logging.getLogger("esker")
 
-GOODBYE_SECONDS: Final = 0.3
-"""Time for the farewells to leave before the sockets are closed."""
-HARD_MESSAGE_LIMIT: Final = 4 * c.MAX_MESSAGE_BYTES
-"""Above ``MAX_MESSAGE_BYTES`` a client gets a sentence (4007); above this the websocket library hangs up (1009)."""
-PING_SECONDS, PONG_SECONDS = 20.0, 20.0
-"""A websocket's peer is asked so often whether it is there. Without an answer in so long it is dropped."""
-SEND_BUFFER: Final = 256 * 1024
-"""The kernel would queue megabytes for a client that does not read, and show it old tiles when it does."""
-
-
-OWN_FILES: Final = 256
-"""Descriptors that connections leave to the database, uploads and children: so many, and a quarter of all at least."""
 SWITCH_SECONDS: Final = 0.0002
 """An append passes four threads on its way to the screen; at each Python would let the other go on for 5 ms first."""
-
-
-TEND_TICKS: Final = 50
-"""Ticks of the HTTP server, ten a second, after which the collector may take its time where there is little to do."""
 
 
 FLAWS: Final = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
@@ -106,57 +80,6 @@ class _Tiles:
         return Watcher(server, top)
 
 
-class _Server(uvicorn.Server):
-    """Says goodbye to the members of all rooms before the sockets are closed."""
-
-    def __init__(
-        self,
-        config: uvicorn.Config,
-        hub: Hub,
-        imports: Imports,
-        host: str,
-        started: Callable[[], Awaitable[None]],
-        node: Member | None = None,
-    ) -> None:
-        """``host``: the address for people who speak plain HTTP and name no host; ``node``: among others."""
-        super().__init__(config)
-        self._node = node
-        self._hub, self._imports, self._host, self._announce = hub, imports, host, started
-        self.collector = Collector()
-
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        if self._node is not None:
-            await self._node.begin()
-        context, self.config.ssl = self.config.ssl, None
-        if context is None or not sockets:
-            await super().startup(sockets)
-        else:  # the door makes the connections: some of them begin without TLS and are sent to https
-            for each in sockets:  # connections that come before the door is made wait in the backlog
-                each.listen(BACKLOG)
-            await super().startup([])
-            self.servers: list[Any] = [Door(each, context, self._protocol, self._host) for each in sockets]
-        if self.started:
-            await self._announce()
-
-    def _protocol(self) -> asyncio.Protocol:
-        make: Any = self.config.http_protocol_class
-        made: asyncio.Protocol = make(config=self.config, server_state=self.server_state, app_state=self.lifespan.state)
-        return made
-
-    async def on_tick(self, counter: int) -> bool:
-        if counter % TEND_TICKS == 0:
-            self.collector.tend()
-        return await super().on_tick(counter)
-
-    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        if self._node is not None:
-            await self._node.leave()
-        await self._imports.close()
-        await self._hub.close()
-        await asyncio.sleep(GOODBYE_SECONDS)
-        await super().shutdown(sockets)
-
-
 class Assembly:
     """A server put together but not yet running. ``close`` must be called, whatever happened."""
 
@@ -181,12 +104,12 @@ class Assembly:
         self._elevation: Elevation | None = None
         self._journal: Journal | None = None
         self._storing: Storing | None = None
-        self._server: _Server | None = None
+        self._server: HttpServer | None = None
+        """The HTTP server, while it runs."""
         self._care: Care | None = None
         self.member: Member | None = None
         """This server as a node, where several share the database."""
         self.imports: Imports | None = None
-        """The HTTP server, once there is one."""
         self.exports: Exports | None = None
         try:
             self._open(make_solver or self._solver)
@@ -267,7 +190,7 @@ class Assembly:
     def _solver(self, device: str | None) -> Solver:
         return OpenClSolver(device=device, max_level=self.settings.level, threads=self.settings.threads)
 
-    def server(self, announce: bool = True) -> _Server:
+    def server(self, announce: bool = True) -> HttpServer:
         """Returns the HTTP server, to be run with ``run``."""
         assert self._journal is not None, "an assembly is open until it is closed"
         assert self._storing is not None
@@ -294,7 +217,7 @@ class Assembly:
         if self.member is not None:
             self.private.write(self.private.open().model_copy(update={"key": self.member.keeper}))
         key = Key(self.private.open().key)
-        front = _front(settings, self.address)
+        front = front_of(settings, self.address)
         member, gauges = self.member, self._gauges
         app = create_app(
             self.hub,
@@ -319,9 +242,9 @@ class Assembly:
 
         host = f"{self.address}:{self.port}"
         near = front.proxies.__contains__ if member is None else lambda who: who in front.proxies or member.knows(who)
-        return _Server(_config(app, near, self._context), self.hub, self.imports, host, started, member)
+        return HttpServer(configured(app, near, self._context), self.hub, self.imports, host, started, member)
 
-    def run(self, server: _Server) -> None:
+    def run(self, server: HttpServer) -> None:
         """Serves until the server is told to stop."""
         self._server = server
         sys.setswitchinterval(SWITCH_SECONDS)
@@ -403,44 +326,6 @@ def _gauges(settings: Settings) -> Gauges | None:
         return Gauges(settings.metrics)
     except ValueError as error:
         raise CannotServe(f"ESKER_METRICS: {error}.") from None
-
-
-def _front(settings: Settings, address: str) -> Front:
-    """Returns by which names this server is reached, and behind which proxies. Raises CannotServe."""
-    try:
-        proxies = Proxies(settings.forwarded_allow_ips)
-    except ValueError as error:
-        raise CannotServe(f"ESKER_FORWARDED_ALLOW_IPS: {error}.") from None
-    url = settings.public_url.rstrip("/").lower() if settings.public_url else None
-    names = {*local_names(), *(name.strip() for name in settings.hosts.split(",") if name.strip())}
-    near = settings.lan or settings.host in ("localhost", "127.0.0.1", "::1")
-    known = hosts((*names, address), url) if near or url or settings.hosts else None
-    # HTTPS with a certificate that people must trust first, or click away, may not be made the only way in.
-    return Front(proxies, known, url, strict=url is not None and url.startswith("https:") and not settings.lan)
-
-
-def _config(app: Any, exempt: Callable[[str], bool], context: ssl.SSLContext | None) -> uvicorn.Config:
-    """``exempt``: addresses of which any number of connections may come: proxies, other nodes."""
-    config = uvicorn.Config(
-        app,
-        ws=WebSocketProtocol,
-        ws_max_size=HARD_MESSAGE_LIMIT,
-        # Tiles are deflated already, and control texts are small: a second deflate costs more than it saves.
-        ws_per_message_deflate=False,
-        ws_ping_interval=PING_SECONDS,
-        ws_ping_timeout=PONG_SECONDS,
-        http=HttpProtocol,
-        log_config=None,
-        access_log=False,
-        server_header=False,
-        timeout_graceful_shutdown=5,
-        proxy_headers=False,  # server/wire/front.py reads the headers of proxies
-    )
-    config.load()
-    config.ssl = context
-    files = system.raise_open_files()
-    bounded(config, Connections(files - max(files // 4, min(OWN_FILES, files // 2)), exempt))
-    return config
 
 
 async def _announce(hub: Hub, private: Private, base: str, settings: Settings) -> None:

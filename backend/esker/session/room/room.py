@@ -20,6 +20,7 @@ from esker.document.revisions import revision
 from esker.fairness.shares import Who
 from esker.process.garbage import weakly
 from esker.session.ground.base_builder import Layers
+from esker.session.ground.client import Client
 from esker.session.ground.frames.feed import TileFeed
 from esker.session.ground.frames.stream import Stream
 from esker.session.ground.frames.tilethread import TileThread
@@ -37,7 +38,7 @@ from esker.session.room.members import QUIET_BACKLOG_BYTES, Member
 from esker.session.room.outbox import Outbox
 from esker.session.room.ports import Journal, Meter, Tenancy
 from esker.session.room.replicas.recent import Encoder
-from esker.session.scoring import Scoring
+from esker.session.scoring import Scorer, Scoring
 
 PRESENCE_TICK: Final = 1 / c.PRESENCE_HZ
 
@@ -80,37 +81,13 @@ class Room(ClassRoom):
         self.id = core.document.id
         self._journal, self._worker, self._on_empty = journal, worker, on_empty
         self._loop = asyncio.get_running_loop()
-        size_m = core.document.settings.size_m
         self._home, self._lane = home, executor.lane()
         self._lane.home = home or None
-        self._feed = TileFeed(
-            tiles,
-            size_m,
-            info.levels,
-            info.finest,
-            self._lane,
-            self._loop,
-            weakly(self._level_taken),
-            weakly(self._requests_changed),
-        )
-        refinement = self._feed if info.finest > info.levels else None
-        self._solve_client = worker.add(
-            info.levels,
-            self._feed.put,
-            weakly(self._solve_failed),
-            refinement,
-            limit=self._feed.limit,
-            confirm=self._feed.confirm,
-            note=self._feed.note,
-            home=home or None,
-        )
-        worker.attend(self._solve_client, False)
-        hydrology = tiles.hydrology if isinstance(tiles, WateredTiles) else None
-        self._rivers = Rivers(hydrology, self._feed, self._loop)
+        self._feed = self._fed_by(tiles)
+        self._solve_client = self._solved_by(worker)
+        self._rivers = Rivers(tiles.hydrology if isinstance(tiles, WateredTiles) else None, self._feed, self._loop)
         self._rivers.works_for(home)
-        scorer = tiles.scorer if isinstance(tiles, ScoredTiles) else None
-        scored = min(c.TASK_LEVEL, info.levels)
-        self.scoring = Scoring(scorer, partial(self._feed.heights, scored), self._loop, weakly(self._tell_score))
+        self.scoring = self._scored_by(tiles.scorer if isinstance(tiles, ScoredTiles) else None)
         self.scoring.works_for(home)
         listeners = weakly(self._laid), weakly(self._tell), weakly(self._slow_changed)
         self._layers = Layers(elevation, base_threads, self._loop, *listeners)
@@ -146,6 +123,39 @@ class Room(ClassRoom):
         """The time at which somebody came, or did more than to answer by itself."""
         self._rivers.follow(core.head)
         self.scoring.follow(core.head)
+
+    def _fed_by(self, tiles: Tiles) -> TileFeed:
+        """Returns what makes tiles of finished levels, in this room's lane."""
+        return TileFeed(
+            tiles,
+            self.core.document.settings.size_m,
+            self.info.levels,
+            self.info.finest,
+            self._lane,
+            self._loop,
+            weakly(self._level_taken),
+            weakly(self._requests_changed),
+        )
+
+    def _solved_by(self, worker: Worker) -> Client:
+        """Returns this room as the solver's thread knows it: nobody is there to see its ground yet."""
+        client = worker.add(
+            self.info.levels,
+            self._feed.put,
+            weakly(self._solve_failed),
+            self._feed if self.info.finest > self.info.levels else None,
+            limit=self._feed.limit,
+            confirm=self._feed.confirm,
+            note=self._feed.note,
+            home=self._home or None,
+        )
+        worker.attend(client, False)
+        return client
+
+    def _scored_by(self, scorer: Scorer | None) -> Scoring:
+        """Returns what compares the ground with a task, on the level that tasks have."""
+        heights = partial(self._feed.heights, min(c.TASK_LEVEL, self.info.levels))
+        return Scoring(scorer, heights, self._loop, weakly(self._tell_score))
 
     # --- people -------------------------------------------------------------------------------------------------
 
