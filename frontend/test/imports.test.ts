@@ -127,6 +127,23 @@ describe("one-way imports", () => {
     expect(drawing.map((f) => relative(SRC, f))).toEqual([]);
   });
 
+  it("exports nothing that nobody names (SPEC H574)", () => {
+    const all = [...files, ...sources(resolve(SRC, "../test"))].map(
+      (path) => [path, readFileSync(path, "utf8")] as const,
+    );
+    const times = new Map<string, number>();
+    for (const [, text] of all) {
+      for (const [word] of text.matchAll(/[\w$]+/g)) times.set(word, (times.get(word) ?? 0) + 1);
+    }
+    const exported = /^export (?:abstract |async )*(?:const|function|class|interface|type|enum) (\w+)/gm;
+    const unnamed = all
+      .filter(([path]) => room(path) !== "generated")
+      .flatMap(([path, text]) => [...text.matchAll(exported)].map(([, name]) => [path, name!] as const))
+      .filter(([, name]) => times.get(name) === 1);
+    expect(times.size).toBeGreaterThan(1000);
+    expect(unnamed.map(([path, name]) => `${relative(SRC, path)}: ${name}`)).toEqual([]);
+  });
+
   it("shows few names in a folder", () => {
     const names = new Map<string, number>();
     for (const path of files) {

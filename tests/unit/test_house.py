@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator, Set
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -219,6 +220,32 @@ def test_files_import_each_other_in_no_circle() -> None:
     """SPEC H491: for types neither; whoever reads a file has read, or can read first, all that it stands on."""
     assert circle(files_and_imports()) == []
     assert circle({"a": {"b"}, "b": {"a"}}) != []
+
+
+def unnamed(files: dict[str, str]) -> list[str]:
+    """Functions, classes and constants of modules by text that stand nowhere but where they are defined."""
+    words = Counter(word for text in files.values() for word in re.findall(r"\w+", text))
+    found = []
+    for path, text in files.items():
+        for node in ast.parse(text).body if path.endswith(".py") else ():
+            names: list[str] = []
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+                names = [node.name]
+            elif isinstance(node, ast.Assign | ast.AnnAssign):
+                targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+                names = [each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)]
+            found += [f"{path}: {name}" for name in names if words[name] == 1]
+    return found
+
+
+def test_nothing_stands_unnamed() -> None:
+    """SPEC H574: what nobody calls or reads goes. The contract is written out for other languages, all of it."""
+    folders = PACKAGE, ROOT / "bench", ROOT / "tests"
+    paths = [path for folder in folders for path in folder.rglob("*.py")]
+    texts = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in paths}
+    ours = ("backend/esker/contract/", "tests/")
+    assert [each for each in unnamed(texts) if not each.startswith(ours)] == []
+    assert unnamed({"a.py": "A = 1\ndef b(): return c\n", "c.py": "from a import b\nclass c: pass\n"}) == ["a.py: A"]
 
 
 def test_generated_files_are_fresh() -> None:

@@ -14,8 +14,6 @@ Floats = NDArray[np.float64]
 TREE, ROCK, TUFT = range(3)
 CELLS_M: Final = (6.5, 4.0, 0.32)
 """Side of a cell of each kind, metres."""
-REACH_M: Final = (1600.0, 260.0, 28.0)
-"""Beyond these none is drawn, metres."""
 SEED: Final = 501
 
 

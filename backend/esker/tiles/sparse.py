@@ -31,7 +31,6 @@ EXPECTED: Final = np.float32(0.5)
 LIKELY: Final = 8.0
 """A tile that is not known is taken for as bad as that where it is this many times too bad: so several levels are made
 in one go near crests, in fewer and fuller steps."""
-HALF: Final = SUBPATCHES // 2
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,6 @@ NONE: Final = 2.0
 Field = NDArray[np.float64]
 EAST, WEST, NORTH, SOUTH = range(4)
 _SIDES: Final = ((0, 1), (0, -1), (1, 0), (-1, 0))
-_MIRROR: Final = (WEST, EAST, SOUTH, NORTH)
 
 
 @dataclass(frozen=True)

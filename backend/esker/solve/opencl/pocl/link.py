@@ -21,7 +21,7 @@ HEADERS = 64 + 6 * 56
 ALLOC, WRITE, EXEC, TLS = 0x2, 0x1, 0x4, 0x400
 NOBITS, SYMTAB, RELA, INIT_KINDS = 8, 2, 4, frozenset({14, 15, 16})
 UNDEFINED, ABSOLUTE, COMMON = 0, 0xFFF1, 0xFFF2
-LOCAL, SECTION_KIND, TLS_KIND = 0, 3, 6
+LOCAL, TLS_KIND = 0, 6
 R_64, R_PC32, R_PLT32, R_PC64 = 1, 2, 4, 24
 R_GOT = frozenset({9, 41, 42})
 """R_X86_64_GOTPCREL, GOTPCRELX and REX_GOTPCRELX: the address of a symbol, read from a table."""

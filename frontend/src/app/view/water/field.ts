@@ -4,7 +4,7 @@
  */
 
 import { effect, type ReadonlySignal, signal } from "@preact/signals-core";
-import { LAKE_LEVEL, QUANTA_PER_CELL, TILE_CELLS } from "../../../generated/contract.ts";
+import { LAKE_LEVEL, QUANTA_PER_CELL } from "../../../generated/contract.ts";
 import type { DetailField } from "../../../tiles/detail/detail.ts";
 import { LevelHeights } from "../../../tiles/water/levelheights.ts";
 import { findWater, quanta, seaQuanta, type Water } from "../../../tiles/water/water.ts";
@@ -117,6 +117,3 @@ export function fieldOf(heights: Float32Array, side: number, sizeM: number, seaM
   const water = findWater({ rows: side, cols: side, z }, seaQuanta(seaM, cellM));
   return { water, side, cellM, stepM: cellM / QUANTA_PER_CELL, heights };
 }
-
-/** Samples along a side of the level on which water is found. */
-export const WATER_SIDE = TILE_CELLS * 2 ** LAKE_LEVEL + 1;
