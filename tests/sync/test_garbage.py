@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from esker.process.garbage import DUE, OVERDUE, Collector, importing, weakly
+from esker.process.garbage import CALM_SECONDS, DUE, OVERDUE, Collector, importing, weakly
 from esker.tiles.decoder import FrameDecoder
 from tests.sync.harness import PATIENCE, LiveServer, stroke
 from tests.sync.test_refined import NEAR, RoofSolver, follow
@@ -137,12 +137,18 @@ def test_all_is_looked_at_when_there_is_time(collector: tuple[Collector, Clock])
         gc.collect()
     left = gc.get_freeze_count()
     del there
-    clock.pass_(5, 0.9)
+    clock.pass_(CALM_SECONDS, 0.9)
     assert not made.tend(), "somebody draws"
-    clock.pass_(5, 0.01)
+    clock.pass_(CALM_SECONDS - 0.5, 0.01)
+    assert not made.tend(), "somebody drew a moment ago"
+    clock.pass_(0.5, 0.3)
+    assert not made.tend(), "somebody has just begun to draw"
+    clock.pass_(CALM_SECONDS - 0.5, 0.01)
+    assert not made.tend(), "somebody drew a moment ago"
+    clock.pass_(0.5, 0.01)
     assert made.tend()
     assert gc.get_freeze_count() <= left - 1000
-    clock.pass_(5, 0.01)
+    clock.pass_(CALM_SECONDS, 0.01)
     assert not made.tend(), "it was done"
 
 

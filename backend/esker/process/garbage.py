@@ -27,6 +27,9 @@ DUE, OVERDUE = 1, 360
 """All is gone through after so many looks at what is new: when there is little to do, and however much there is."""
 CALM: Final = 0.1
 """Parts of a processor below which a process has little to do."""
+CALM_SECONDS: Final = 5.0
+"""All is gone through when there has been little to do for so long, up to the last moment: somebody who has just begun
+to draw would wait for it."""
 
 
 def weakly(method: Callable[P, T]) -> Callable[P, T | None]:
@@ -71,6 +74,7 @@ class Collector:
         self._busy, self._now = busy, now
         self._looks = 0
         self._tended, self._was_busy = now(), busy()
+        self._calm_since = self._tended
         self._before = gc.get_threshold()
 
     def begin(self) -> None:
@@ -92,12 +96,13 @@ class Collector:
             gc.freeze()
 
     def tend(self) -> bool:
-        """Goes through everything where that is due and the process has had little to do since the last call. Returns
-        whether it did."""
+        """Goes through everything where that is due and the process has had little to do for ``CALM_SECONDS``. It is
+        called more often than that, and had little to do between two calls or not. Returns whether it did."""
         now, busy = self._now(), self._busy()
-        calm = busy - self._was_busy < CALM * (now - self._tended)
+        if busy - self._was_busy >= CALM * (now - self._tended):
+            self._calm_since = now
         self._tended, self._was_busy = now, busy
-        if self._looks < (DUE if calm else OVERDUE):
+        if self._looks < (DUE if now - self._calm_since >= CALM_SECONDS else OVERDUE):
             return False
         gc.unfreeze()
         gc.collect()

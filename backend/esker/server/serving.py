@@ -31,8 +31,8 @@ PING_SECONDS, PONG_SECONDS = 20.0, 20.0
 """A websocket's peer is asked so often whether it is there. Without an answer in so long it is dropped."""
 OWN_FILES: Final = 256
 """Descriptors that connections leave to the database, uploads and children: so many, and a quarter of all at least."""
-TEND_TICKS: Final = 50
-"""Ticks of the HTTP server, ten a second, after which the collector may take its time where there is little to do."""
+TEND_TICKS: Final = 5
+"""Ticks of the HTTP server, ten a second, after which the collector is asked whether there is time for it."""
 
 
 class HttpServer(uvicorn.Server):
