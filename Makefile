@@ -40,12 +40,11 @@ test: ## set up, then run every check and every test
 # So many parts at a time, the longest first. Rooms, servers and the rest wait most of the time: beside them two others keep two
 # cores busy. The checks and the page come early and compile no loops: meanwhile the people's servers do, for the parts that
 # follow (they are kept). What computes is nicer than the people's pages and servers: they have what they need at once, it
-# has what is left. Rooms take the longest, and wait most of it: they come between the two.
+# has what is left.
 #
 # What failed is run once more. A test that passes then depends on what else the machine did: it is a defect of the test, and
 # the output names it, but it says nothing against the change. What is wrong fails twice.
 NICE := $(shell command -v nice >/dev/null && echo nice -n 10)
-LESS_NICE := $(NICE:10=5)
 told = trap 'echo "Part $(1): $$SECONDS s; processor time, of the shell and of what it ran:"; times' EXIT
 tested = $(call told,$(1)); $(3) $(BIN)/python -m pytest --durations=12 -o cache_dir=.pytest_cache/$(1) $(2) || { echo "Once more, what failed:"; \
   $(3) $(BIN)/python -m pytest -o cache_dir=.pytest_cache/$(1) --last-failed --last-failed-no-failures=none $(2); }
@@ -57,7 +56,7 @@ test-drawn:
 	$(call tested,drawn,$(DRAWN),$(NICE))
 
 test-rooms:
-	$(call tested,rooms,$(ROOMS),$(LESS_NICE))
+	$(call tested,rooms,$(ROOMS),$(NICE))
 
 test-servers:
 	$(call tested,servers,$(SERVERS),$(NICE))

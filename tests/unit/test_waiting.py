@@ -389,3 +389,25 @@ def test_what_a_room_held_goes_back_to_the_system_after_it_closed(
         assert given.wait(deadline)
         assert room.closed
         assert len(hub._places) == 0
+
+
+def test_a_server_that_ends_gives_no_memory_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its loop takes no more work for other threads, and the timer said so in the log, in one of some hundred ends."""
+    given = Mock()
+    monkeypatch.setattr(openrooms, "GIVE_BACK_SECONDS", 0.01)
+    monkeypatch.setattr("esker.process.system.give_memory_back", given)
+
+    async def ending() -> None:
+        rooms = openrooms.ClosedRooms()
+        rooms.give_back_soon()
+        await asyncio.sleep(0.1)
+        assert given.call_count == 1
+        rooms.give_back_soon()
+        rooms.end()
+        at_rest = openrooms.ClosedRooms()
+        at_rest.end()
+        at_rest.give_back_soon()
+        await asyncio.sleep(0.1)
+
+    asyncio.run(ending())
+    assert given.call_count == 1

@@ -448,6 +448,7 @@ class Hub:
         for room in rooms:
             room.shut()
         self._rooms.clear()
+        self._memory.end()
         self._tile_thread.shutdown(wait=False, cancel_futures=True)
         self._base_threads.shutdown(wait=False, cancel_futures=True)
         self.reading.shutdown()

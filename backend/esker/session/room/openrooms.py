@@ -82,11 +82,18 @@ class ClosedRooms:
 
     def __init__(self) -> None:
         self._timer: asyncio.TimerHandle | None = None
+        self._is_over = False
 
     def give_back_soon(self) -> None:
         """Gives it back to the system soon, once for all rooms that close within a while."""
-        if self._timer is None:
+        if self._timer is None and not self._is_over:
             self._timer = asyncio.get_running_loop().call_later(GIVE_BACK_SECONDS, self._give_back)
+
+    def end(self) -> None:
+        """Gives nothing back from now on: the server ends, and its loop takes no more work for other threads."""
+        self._is_over = True
+        if self._timer is not None:
+            self._timer.cancel()
 
     def _give_back(self) -> None:
         self._timer = None
