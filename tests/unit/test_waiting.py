@@ -392,7 +392,7 @@ def test_what_a_room_held_goes_back_to_the_system_after_it_closed(
 
 
 def test_a_server_that_ends_gives_no_memory_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its loop takes no more work for other threads, and the timer said so in the log, in one of some hundred ends."""
+    """Its loop takes no more work for other threads, and the timer said so in the log now and then."""
     given = Mock()
     monkeypatch.setattr(openrooms, "GIVE_BACK_SECONDS", 0.01)
     monkeypatch.setattr("esker.process.system.give_memory_back", given)
