@@ -26,7 +26,7 @@ from esker.document.history.folding import SILENT, UNLIMITED, silent
 from esker.document.ops import Refusal, StrokeSet
 from esker.document.wire import Compressed, decompressed, op_json
 from esker.store import lessons, timestamps
-from esker.store.engine.ports import Connection, Engine
+from esker.store.engine.ports import Connection, Engine, Write
 from esker.store.engine.ports import Unwritable as Unwritable
 from esker.store.engine.sqlite import Sqlite
 from esker.store.row import Row as Row
@@ -133,21 +133,26 @@ class Journal:
 
         Fails with UsedTwice on a clock or id used before, with Unwritable, Unknown, Moved and HistoryFull.
         """
-        more = sum(len(row.op) for row in rows)
+        more, now = sum(len(row.op) for row in rows), self._now()
+        made = [(thing, row.author) for row in rows for thing in lessons.begun(row.op)]
+        digests = [digest for row in rows for digest in contents(row.op)]
 
         def write(db: Connection) -> None:
             self._make_room(db, terrain, more)
             db.executemany("INSERT INTO ops VALUES (?,?,?,?,?,?)", ((terrain, *row) for row in rows))
             if rows:
-                self._timestamps.note(db, terrain, rows[0].clock, self._now())
+                self._timestamps.note(db, terrain, rows[0].clock, now)
             if people:
                 timestamps.keep(db, terrain, people)
-            if made := [(thing, row.author) for row in rows for thing in lessons.begun(row.op)]:
+            if made:
                 lessons.keep_makers(db, terrain, made)
-            if digests := [digest for row in rows for digest in contents(row.op)]:
+            if digests:
                 name_grids(db, terrain, digests)
 
-        return self.submit(write, terrain)
+        def is_one_statement() -> bool:
+            return len(rows) == 1 and not (people or made or digests or self._timestamps.is_due(terrain, now))
+
+        return self.submit(Write(write, is_one_statement), terrain)
 
     def keep_snapshot(self, document: c.Document) -> Future[None]:
         """Has a document that the terrain has now, all of whose ops are committed, written beside them, soon.

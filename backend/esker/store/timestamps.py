@@ -35,13 +35,17 @@ class Timestamps:
 
     def note(self, db: Connection, terrain: str, clock: int, now: float) -> None:
         """Ops from ``clock`` on are committed at ``now``, seconds since 1970."""
-        last = self._last.get(terrain)
-        # A clock that was set back must not leave ops without a moment for as long.
-        if last is None or not last <= now < last + TIMESTAMP_SECONDS:
+        if self.is_due(terrain, now):
             db.execute("INSERT INTO moments VALUES (?,?,?) ON CONFLICT DO NOTHING", (terrain, clock, now))
             self._last[terrain] = now
             if len(self._last) > 10_000:
                 self._last.clear()
+
+    def is_due(self, terrain: str, now: float) -> bool:
+        """Returns whether ``note`` will write."""
+        last = self._last.get(terrain)
+        # A clock that was set back must not leave ops without a moment for as long.
+        return last is None or not last <= now < last + TIMESTAMP_SECONDS
 
     def clear(self) -> None:
         """Forgets all last moments."""

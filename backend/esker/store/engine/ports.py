@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 T = TypeVar("T")
 
@@ -47,6 +48,19 @@ class Connection(Protocol):
 
     def executemany(self, sql: str, rows: Iterable[Sequence[Any]], /) -> object:
         """Runs a statement for each row of values."""
+
+
+@dataclass(frozen=True)
+class Write(Generic[T]):
+    """What is written in a commit, with what an engine may ask of it just before."""
+
+    run: Callable[[Connection], T]
+    is_one_statement: Callable[[], bool]
+    """Whether ``run`` will run no more than one statement, which is a commit by itself where nothing else waits."""
+
+    def __call__(self, db: Connection) -> T:
+        """Returns what ``run`` returns."""
+        return self.run(db)
 
 
 class Unwritable(Exception):

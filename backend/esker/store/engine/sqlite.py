@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from esker.store.engine.checkpoints import WRITERS_PAGES, Checkpoints
-from esker.store.engine.ports import Connection, Unwritable, UsedTwice
+from esker.store.engine.ports import Connection, Unwritable, UsedTwice, Write
 from esker.store.engine.writer import write_all
 from esker.store.space import NoSpace, Space
 from esker.store.upkeep import migrations
@@ -77,24 +77,28 @@ class Sqlite:
         # From here on an item cannot be cancelled. An item whose HTTP client hung up before is not written.
         batch = [(write, future) for write, future in batch if future.set_running_or_notify_cancel()]
         outcomes: list[tuple[Future[Any], Any, Exception | None]] = []
-        # Every statement gives the interpreter's lock away and waits for it, so an item that is alone has no savepoint.
+        # Every statement gives the interpreter's lock away and waits for it, so an item that is alone has no savepoint,
+        # and where it is one statement that is the commit.
         alone = len(batch) == 1
+        bare = alone and isinstance(batch[0][0], Write) and batch[0][0].is_one_statement()
         changes = db.total_changes
         try:
-            db.execute("BEGIN IMMEDIATE")
+            if not bare:
+                db.execute("BEGIN IMMEDIATE")
             for write, future in batch:
                 if not alone:
                     db.execute("SAVEPOINT item")
                 try:
                     outcomes.append((future, write(db), None))
                 except Exception as error:
-                    if not db.in_transaction:  # SQLite gave the whole transaction up: a full disk, an I/O error
-                        raise
-                    db.execute("ROLLBACK" if alone else "ROLLBACK TO item")
+                    if not bare:
+                        if not db.in_transaction:  # SQLite gave the whole transaction up: a full disk, an I/O error
+                            raise
+                        db.execute("ROLLBACK" if alone else "ROLLBACK TO item")
                     outcomes.append((future, None, error))
                 if not alone:
                     db.execute("RELEASE item")
-            if not alone or outcomes[0][2] is None:
+            if not bare and (not alone or outcomes[0][2] is None):
                 db.execute("COMMIT")
             # A statement that finds the disk full may end alone, and leave the transaction to the others of its batch.
             # A batch that found nothing to change is no sign that there is room again.
