@@ -30,6 +30,7 @@ def table(result: dict[str, Any]) -> str:
         f"(p99), first tile in {alone['tile_p50_ms']:.0f} ms (p50), settled {alone['settling_s']:.2f} s after the last "
         f"change. The floor, which is the worst of these by the median: {floor}. {_read_against(result)}; **bold** "
         f"where it is above both the aim and the floor:",
+        *_beside(result["runs"]),
         "",
         f"| attack | {' | '.join(f'{name} (aim {aims[key]:.0f})' for key, name in KEYS.items())} | memory "
         f"(aim {aims['memory_mb']:,} MB) | afterwards |",
@@ -42,6 +43,21 @@ def table(result: dict[str, Any]) -> str:
         f"the log: {result['tracebacks']}.",
     ]
     return "\n".join(lines)
+
+
+def _beside(runs: dict[str, Any]) -> list[str]:
+    """Returns what is said of the disk, and of rows that were measured more than once."""
+    disks = [run["disk"] for run in runs.values() if run.get("disk")]
+    again = sum("measured" in run for run in runs.values())
+    said = []
+    if disks:
+        said += [
+            "",
+            f"The disk by itself, which others use too: a page was written and synced in {disks[0]['p99_ms']:.0f} ms "
+            f"(p99) without an attack, in {max(disk['worst_ms'] for disk in disks):.0f} ms at worst beside one. "
+            + (f"{again} rows missed an aim and were measured three times: the middle stands here." if again else ""),
+        ]
+    return said
 
 
 def _read_against(result: dict[str, Any]) -> str:
