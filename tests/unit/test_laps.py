@@ -107,7 +107,7 @@ def test_beside_another_address_those_that_take_much_have_less(monkeypatch: pyte
 
     async def run() -> None:
         laps = Laps()
-        crowd, other = LapShare(laps), LapShare(laps)
+        crowd, other = LapShare(laps, "a"), LapShare(laps, "b")
         for _ in range(3):
             crowd.take(0.0)
             assert crowd.left(is_small=False) == pytest.approx(LAP_SECONDS), "it is alone"
@@ -116,7 +116,7 @@ def test_beside_another_address_those_that_take_much_have_less(monkeypatch: pyte
         assert crowd.left(is_small=False) == pytest.approx(SHARED_LAP_SECONDS)
         assert crowd.left(is_small=True) == pytest.approx(LAP_SECONDS * SMALL_LAPS)
         assert other.left(is_small=False) < SHARED_LAP_SECONDS, "and so has the other"
-        third = LapShare(laps)
+        third = LapShare(laps, "c")
         assert third.left(is_small=False) == pytest.approx(SHARED_LAP_SECONDS)
         crowd.take(1.0)
         began, came = asyncio.get_running_loop().time(), asyncio.Event()

@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
+from esker.fairness.laps import Laps
 from esker.fairness.shares import Who
-from esker.fairness.spending import MUCH, PACE, PAYS, USUAL_SECONDS, Pace
+from esker.fairness.spending import MUCH, PACE, PAYS, SHARED_PACE, USUAL_SECONDS, Accounts, Pace
 from esker.fairness.turns import FairThreads
 from esker.server.wire import pacing
 from esker.server.wire.pacing import Paced, _Metered
@@ -136,6 +137,50 @@ def test_requests_at_once_wait_for_each_other() -> None:
         pace.end(10.0, counted, 0.01)
     assert pace.begin(10.0)[0] == pytest.approx(0.04 / PACE.per_second)
     assert pace.begin(12.0)[0] == 0.0
+
+
+def test_beside_people_of_another_address_requests_come_at_a_slower_pace() -> None:
+    """SPEC P668: acknowledgements waited behind what a stranger had asked for; those of one address are alone."""
+
+    async def run() -> None:
+        laps = Laps()
+        sockets, requests = Accounts(laps=laps), Accounts(laps=laps)
+        loop = asyncio.get_running_loop()
+
+        def wait(address: str) -> float:
+            pace = requests.pace(address)
+            counted = pace.begin(loop.time() + 1e6)[1]
+            pace.end(loop.time() + 1e6, counted, 0.1)
+            return pace.begin(loop.time() + 1e6)[0]
+
+        assert wait("192.0.2.1") == pytest.approx(0.1 / PACE.per_second, rel=0.01)
+        sockets.member("192.0.2.2").took(0.0001, 0.0001)
+        assert wait("192.0.2.2") == pytest.approx(0.1 / PACE.per_second, rel=0.01), "a class that opens the page"
+        assert wait("192.0.2.3") == pytest.approx(0.1 / SHARED_PACE.per_second, rel=0.01)
+
+    asyncio.run(run())
+
+
+def test_requests_and_sockets_of_a_server_have_the_same_laps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SPEC P668: of requests it is asked who is there, of what was read from sockets it is known."""
+    told, asked = set[Laps](), set[Laps]()
+    taken, is_shared = Laps.taken, Laps.is_shared
+
+    def noted(laps: Laps, home: str) -> None:
+        told.add(laps)
+        taken(laps, home)
+
+    def looked(laps: Laps, home: str) -> bool:
+        asked.add(laps)
+        return is_shared(laps, home)
+
+    monkeypatch.setattr(Laps, "taken", noted)
+    monkeypatch.setattr(Laps, "is_shared", looked)
+    with LiveServer(tmp_path) as server:
+        server.join(*server.create()).close()
+        assert server.http("GET", "/healthz")[0] == 200
+    assert len(asked) == 1
+    assert asked <= told, "a socket that nobody has been asked about yet has laps of its own"
 
 
 @pytest.mark.usefixtures("ticks")

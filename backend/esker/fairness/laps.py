@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
@@ -29,32 +30,26 @@ SMALL_LAPS: Final = 1.5
 
 
 class Laps:
-    """Numbers the laps of the event loop that runs, and knows whose shares of them something was taken of last."""
+    """Numbers the laps of the event loop that runs, and knows which addresses took something of them last."""
 
     def __init__(self) -> None:
         self._number = 0
         self._loop: asyncio.AbstractEventLoop | None = None
         """The loop that counts the present lap's end."""
-        self._shares = 0
-        self._here = (-1, -math.inf), (-1, -math.inf)
-        """The two shares of which something was taken last, the later one first, by number, and when."""
+        self._here = ("", -math.inf), ("", -math.inf)
+        """The two addresses that took something last, the later one first, and when."""
 
-    def new_share(self) -> int:
-        """Returns the number of a share that begins."""
-        self._shares += 1
-        return self._shares
-
-    def taken(self, share: int) -> None:
-        """Notes that something was taken of a share just now."""
+    def taken(self, home: str) -> None:
+        """Notes that an address took something just now."""
         last, before = self._here
-        now = asyncio.get_running_loop().time()
-        self._here = (share, now), (before if last[0] == share else last)
+        now = time.monotonic()
+        self._here = (home, now), (before if last[0] == home else last)
 
-    def is_shared(self, share: int) -> bool:
-        """Whether something was taken of another share of late."""
+    def is_shared(self, home: str) -> bool:
+        """Whether another address took something of late."""
         last, before = self._here
-        other = before if last[0] == share else last
-        return asyncio.get_running_loop().time() - other[1] < OF_LATE
+        other = before if last[0] == home else last
+        return time.monotonic() - other[1] < OF_LATE
 
     def now(self) -> int:
         """Returns the number of the present lap, which is greater in the next."""
@@ -104,13 +99,14 @@ class _Taken:
 class LapShare:
     """What the connections of one address take of each lap. Lives in an event loop."""
 
-    __slots__ = ("_held", "_laps", "_number", "_others", "_small", "_taken")
+    __slots__ = ("_held", "_home", "_laps", "_others", "_small", "_taken")
 
-    def __init__(self, laps: Laps) -> None:
-        self._laps, self._number = laps, laps.new_share()
+    def __init__(self, laps: Laps, home: str = "") -> None:
+        """``home``: the address, as ``shares.Who.home`` names it."""
+        self._laps, self._home = laps, home
         self._taken, self._held = _Taken(laps), _Taken(laps)
         self._small = _Line(self._taken, lambda: (LAP_SECONDS * SMALL_LAPS, 0.0))
-        self._others = _Line(self._held, partial(_limits, laps, self._number))
+        self._others = _Line(self._held, partial(_limits, laps, home))
 
     def left(self, is_small: bool) -> float:
         """Returns the seconds of this lap that they still have. ``is_small``: for one that takes little each time."""
@@ -119,7 +115,7 @@ class LapShare:
 
     def take(self, seconds: float, held: float = 0.0) -> None:
         """Notes that one of them took so many seconds of processor time just now, and held the loop up for ``held``."""
-        self._laps.taken(self._number)
+        self._laps.taken(self._home)
         self._taken.take(seconds)
         self._held.take(max(seconds, WAITED * held))
 
@@ -131,8 +127,8 @@ class LapShare:
         return self._small if is_small else self._others
 
 
-def _limits(laps: Laps, share: int) -> tuple[float, float]:
-    return (SHARED_LAP_SECONDS, SHARED_LAP_REST) if laps.is_shared(share) else (LAP_SECONDS, LAP_REST)
+def _limits(laps: Laps, home: str) -> tuple[float, float]:
+    return (SHARED_LAP_SECONDS, SHARED_LAP_REST) if laps.is_shared(home) else (LAP_SECONDS, LAP_REST)
 
 
 class _Line:

@@ -15,6 +15,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, TypeVar
 
 from esker.fairness.laps import Laps, LapShare, Waiting
@@ -43,6 +44,9 @@ STRAINED_PRICE: Final = 2.0
 PACE: Final = Rate(0.2, 0.0)
 """Processor time of the requests of one address that has asked for much, and of its connections together where they
 have taken much: a rest follows each, in which others have their turns."""
+SHARED_PACE: Final = Rate(0.08, 0.0)
+"""What takes its place for requests where people of another address are there: an acknowledgement waits for whatever
+the loop has begun on its way in and out."""
 LONGEST_REST: Final = 5.0
 """A connection rests no longer than this, however much its address has to make up for."""
 CALM_REST, CALM_SECONDS = 20.0, 0.001
@@ -66,26 +70,26 @@ PAYS: ContextVar[Callable[[float], None] | None] = ContextVar("PAYS", default=No
 class Purse:
     """Seconds that may be spent. It may be overdrawn, as what something costs is known afterwards."""
 
-    __slots__ = ("_at", "_rate", "left")
+    __slots__ = ("_at", "left", "rate")
 
     def __init__(self, rate: Rate) -> None:
-        self._rate, self._at, self.left = rate, math.inf, rate.burst
+        self.rate, self._at, self.left = rate, math.inf, rate.burst
 
     def pay(self, now: float, seconds: float) -> bool:
         """Takes ``seconds`` out at time ``now``; False when that is more than there was."""
-        self.left = min(self._rate.burst, self.left + max(0.0, now - self._at) * self._rate.per_second) - seconds
+        self.left = min(self.rate.burst, self.left + max(0.0, now - self._at) * self.rate.per_second) - seconds
         self._at = now
         return self.left >= 0
 
     @property
     def debt(self) -> float:
         """Seconds from the last payment until it is no longer overdrawn."""
-        return max(0.0, -self.left / self._rate.per_second)
+        return max(0.0, -self.left / self.rate.per_second)
 
     @property
     def share(self) -> float:
         """Share of the purse that is left, at most 1."""
-        return self.left / self._rate.burst
+        return self.left / self.rate.burst
 
 
 class Pace:
@@ -95,14 +99,16 @@ class Pace:
     when it begins, so that the next waits for it.
     """
 
-    __slots__ = ("_purse", "_usual")
+    __slots__ = ("_is_shared", "_purse", "_usual")
 
-    def __init__(self) -> None:
-        self._purse, self._usual = Purse(PACE), USUAL_SECONDS
+    def __init__(self, is_shared: Callable[[], bool] = lambda: False) -> None:
+        """``is_shared``: whether people of other addresses are there."""
+        self._purse, self._usual, self._is_shared = Purse(PACE), USUAL_SECONDS, is_shared
 
     def begin(self, now: float) -> tuple[float, float]:
         """Counts a request. Returns the seconds that it waits for those before it, and what it was counted as."""
         self._purse.pay(now, 0.0)
+        self._purse.rate = SHARED_PACE if self._is_shared() else PACE
         wait, counted = self._purse.debt, self._usual
         self._purse.pay(now, counted)
         return wait, counted
@@ -128,8 +134,8 @@ class Crowd:
 
     __slots__ = ("lap", "pace")
 
-    def __init__(self, laps: Laps) -> None:
-        self.lap, self.pace = LapShare(laps), Purse(PACE)
+    def __init__(self, laps: Laps, home: str = "") -> None:
+        self.lap, self.pace = LapShare(laps, home), Purse(PACE)
 
 
 class Account:
@@ -215,11 +221,12 @@ class Account:
 class Accounts:
     """The shared purses of a server. When too many are known, those that were used longest ago are forgotten."""
 
-    def __init__(self, most_keys: int = MOST_KEYS) -> None:
+    def __init__(self, most_keys: int = MOST_KEYS, laps: Laps | None = None) -> None:
+        """``laps``: those of the event loop, where others have accounts of it too (default: nobody has)."""
         self._purses: OrderedDict[tuple[str, str, _Kind], Purse] = OrderedDict()
         self._paces: OrderedDict[str, Pace] = OrderedDict()
         self._crowds: OrderedDict[str, Crowd] = OrderedDict()
-        self._laps = Laps()
+        self._laps = laps or Laps()
         self._most = most_keys
 
     def stranger(self, address: str) -> Account:
@@ -236,11 +243,13 @@ class Accounts:
 
     def pace(self, address: str) -> Pace:
         """Returns the pace of the requests of this address."""
-        return self._known(self._paces, Who(address).home, Pace)
+        home = Who(address).home
+        return self._known(self._paces, home, lambda: Pace(partial(self._laps.is_shared, home)))
 
     def _open(self, address: str, kind: _Kind) -> Account:
         shared = tuple(self._purse(place, key, kind) for place, key in Who(address).counted())
-        return Account(shared, kind, self._known(self._crowds, Who(address).home, lambda: Crowd(self._laps)))
+        home = Who(address).home
+        return Account(shared, kind, self._known(self._crowds, home, lambda: Crowd(self._laps, home)))
 
     def _purse(self, place: str, key: str, kind: _Kind) -> Purse:
         times = NETWORK if place == "network" else 1.0

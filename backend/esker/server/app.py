@@ -11,6 +11,7 @@ from typing import Final
 from fastapi import FastAPI, Request
 
 from esker.cluster.passing import Entrance, Passing
+from esker.fairness.laps import Laps
 from esker.fairness.shares import Places, Rate, Rates, Share
 from esker.fairness.turns import Turns
 from esker.jobs import Imports
@@ -100,7 +101,8 @@ def create_app(
         openapi_url="/api/openapi.json",
         lifespan=lifespan,
     )
-    _stand_before(app, front, member)
+    laps = Laps()
+    _stand_before(app, front, member, laps)
     classes = Classes(hub, grids)
     collections = Collections(classes, data / "collections")
     if member is not None and member.rooms is not None:
@@ -114,7 +116,7 @@ def create_app(
     add_exports(app, hub, exports)
     add_deletion(app, hub, classes)
     add_classes(app, classes, collections)
-    add_wall(app, classes, front, cluster)
+    add_wall(app, classes, front, laps, cluster)
     add_health(app, hub, cluster)
     if gauges is not None:
         add_metrics(app, gauges)
@@ -127,19 +129,19 @@ def create_app(
 
     add_links(app, hub, warned)
     add_keeper(app, hub, key)
-    add_socket(app, hub, front, cluster)
+    add_socket(app, hub, front, laps, cluster)
     add_previews(app, hub, pictures)
     add_page(app, hub, page, data, pictures)
     return app
 
 
-def _stand_before(app: FastAPI, front: Front, member: Member | None) -> None:
+def _stand_before(app: FastAPI, front: Front, member: Member | None, laps: Laps) -> None:
     """Adds what each request passes before its route; who is added last is passed first."""
     app.add_middleware(Bodies)
     if member is not None and member.rooms is not None:
         app.add_middleware(Passing, cluster=member.cluster, terrain_of=member.rooms.terrain_of)
     app.add_middleware(Gate, front=front)
-    app.add_middleware(Paced)
+    app.add_middleware(Paced, laps=laps)
     app.add_middleware(Headers, strict=front.strict)
     app.add_middleware(Forwarded, front=front)
     if member is not None:

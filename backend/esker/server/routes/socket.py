@@ -14,6 +14,7 @@ from websockets.frames import Frame, Opcode
 
 from esker import contract as c
 from esker.cluster.node import Cluster
+from esker.fairness.laps import Laps
 from esker.fairness.shares import Full, Places, Share, Who
 from esker.fairness.spending import Account, Accounts
 from esker.fairness.turns import Turnstile
@@ -153,9 +154,9 @@ async def accepted(socket: WebSocket, front: Front, long: Turnstile) -> tuple[Wi
     return transport, subprotocol, against is None
 
 
-def add_socket(app: FastAPI, hub: Hub, front: Front, cluster: Cluster | None = None) -> None:
-    """Adds the route. ``cluster``: where other servers may have the terrain."""
-    accounts, sockets, long = Accounts(), Places(SOCKETS), Turnstile()
+def add_socket(app: FastAPI, hub: Hub, front: Front, laps: Laps, cluster: Cluster | None = None) -> None:
+    """Adds the route. ``laps``: those of the event loop; ``cluster``: where other servers may have the terrain."""
+    accounts, sockets, long = Accounts(laps=laps), Places(SOCKETS), Turnstile()
 
     @app.websocket("/ws")
     async def ws(socket: WebSocket) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import FastAPI, WebSocket
 
 from esker.cluster.node import Cluster
+from esker.fairness.laps import Laps
 from esker.fairness.spending import Accounts
 from esker.fairness.turns import Turnstile
 from esker.lesson.classes import Classes
@@ -15,9 +16,9 @@ from esker.server.routes.socket import accepted, messages, refuse
 from esker.server.wire.front import Front
 
 
-def add_wall(app: FastAPI, classes: Classes, front: Front, cluster: Cluster | None = None) -> None:
-    """Adds it. ``cluster``: where other servers may have the class."""
-    walls, accounts, long = Walls(classes), Accounts(), Turnstile()
+def add_wall(app: FastAPI, classes: Classes, front: Front, laps: Laps, cluster: Cluster | None = None) -> None:
+    """Adds it. ``laps``: those of the event loop; ``cluster``: where other servers may have the class."""
+    walls, accounts, long = Walls(classes), Accounts(laps=laps), Turnstile()
 
     @app.websocket("/ws/wall")
     async def wall(socket: WebSocket) -> None:

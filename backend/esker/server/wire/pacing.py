@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Coroutine, Generator
 from typing import Any, Final
 
+from esker.fairness.laps import Laps
 from esker.fairness.spending import MUCH, PAYS, Accounts, Purse
 from esker.server.routes.answers import answer
 
@@ -33,8 +34,9 @@ TOO_MUCH: Final = "Too much was asked for from your address. Wait a moment."
 class Paced:
     """Runs requests at the pace of their addresses; sockets pay by themselves (``server/wire/websocket.py``)."""
 
-    def __init__(self, app: Any) -> None:
-        self.app, self._accounts = app, Accounts()
+    def __init__(self, app: Any, laps: Laps | None = None) -> None:
+        """``laps``: those of the event loop, by which it knows whether people of other addresses are there."""
+        self.app, self._accounts = app, Accounts(laps=laps)
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         if scope["type"] != "http":
