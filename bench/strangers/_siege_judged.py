@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from copy import deepcopy
 from statistics import median
 from typing import Any, Final
 
@@ -54,6 +55,20 @@ def judged(runs: dict[str, Any]) -> dict[str, list[str]]:
         lost = figures["closed"] + figures["unanswered"]
         said += [f"{lost} of the people's changes or connections were lost"] if lost else []
     return {name: said for name, said in wrong.items() if said}
+
+
+def unsure(runs: dict[str, Any]) -> list[str]:
+    """Returns which attacks are to be measured again: whose aims do not hold, or would not without what the machine had
+    beside a process that sends nothing. Two measurements may both have met a disk that stood still."""
+    copy = deepcopy(runs)
+    missed = judged(copy)
+    both = {name: (run, run.get("after", {})) for name, run in copy.items() if name != "alone"}
+    return [
+        name
+        for name, parts in both.items()
+        if name in missed
+        or any(part.get("times_alone", {}).get(key, 0) > TIMES[key] for part in parts for key in TIMES)
+    ]
 
 
 def merged(

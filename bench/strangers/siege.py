@@ -5,8 +5,9 @@ attacks come from a process of their own. Measured for the people: from an appen
 to the first tile that shows it, and from their last append to settled ground; for the server: memory, disk,
 descriptors, while the attack goes on and some seconds after it. Ratios are to the same without an attack in this run,
 and to the same beside a process that takes as much of the processors as the attack's did and sends nothing: that much
-the machine does by itself, whose processors attackers share here. What misses an aim is measured twice more, and of the
-three the middle counts; what the disk took meanwhile for writes of its own stands beside each.
+the machine does by itself, whose processors attackers share here. What misses an aim, or does by the first of these
+ratios alone, is measured twice more, and of the three the middle counts; what the disk took meanwhile for writes of the
+bench's own stands beside each.
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -38,7 +38,7 @@ from bench.strangers._attacks import ATTACKS as FIRST_ATTACKS
 from bench.strangers._attacks import BY_LINK, Target
 from bench.strangers._lesson_attacks import BY_PUPIL, LESSON_ATTACKS
 from bench.strangers._siege_disk import Disk
-from bench.strangers._siege_judged import MOST_MEMORY_MB, TIMES, floor, judged, merged, middle
+from bench.strangers._siege_judged import MOST_MEMORY_MB, TIMES, floor, judged, merged, middle, unsure
 from esker import contract as c
 from esker.tiles.codec.frame import read_frame
 from esker.tiles.codec.rivers import is_rivers
@@ -334,7 +334,7 @@ async def _run(server: Server, names: Sequence[str], plan: Plan) -> tuple[dict[s
                 alone.append(await _drawn(people, plan.seconds))
             out[name] = await besieged(name)
         out["alone"] |= floor(alone)
-        for name in judged(deepcopy(out)):
+        for name in unsure(out):
             measured = [out[name]]
             while len(measured) <= AGAIN and time.monotonic() < plan.until:
                 measured.append(await besieged(name))

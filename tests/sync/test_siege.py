@@ -82,13 +82,29 @@ def test_of_three_times_the_middle_counts_and_all_that_was_lost() -> None:
     assert _siege_judged.judged(runs) == {"x": ["1 of the people's changes or connections were lost"]}
 
 
+def test_what_only_another_stall_excuses_is_measured_again() -> None:
+    """SPEC P667: a disk that stood still beside the attack, and beside the process that sends nothing too."""
+    stalled = {"ack_p99_ms": 80.0, "tile_p50_ms": 40.0, "settling_s": 1.0}
+    runs = {
+        "alone": figures(),
+        "fine": row(19.0, 40.0),
+        "excused": row(70.0, 40.0) | {"nothing": stalled},
+        "missed": row(70.0, 40.0),
+    }
+    assert _siege_judged.unsure(runs) == ["excused", "missed"]
+    assert "times_alone" not in runs["fine"], "nothing is written into them yet"
+    assert set(_siege_judged.judged(runs)) == {"missed"}
+
+
 def test_what_misses_an_aim_is_measured_three_times(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """SPEC P667: and nothing else is."""
     made: list[str] = []
 
     async def besieged(_: Any, names: list[str], *more: Any) -> dict[str, Any]:
         made.append(names[0])
-        return row(9e9 if names[0] == "codes" else 0.0, 0.0, after=0.0)
+        found = row(9e9 if names[0] == "codes" else 0.0, 0.0, after=0.0) | {"settling_s": 0.0}
+        found["after"] |= {"tile_p50_ms": 0.0, "settling_s": 0.0}
+        return found
 
     monkeypatch.setattr(siege, "_besieged", besieged)
     with LiveServer(tmp_path) as live:
