@@ -21,15 +21,15 @@ TIMES = [1000.0]
 def journal(tmp_path: Path) -> Iterator[Journal]:
     """A journal whose clock stands still, with a first op that notes the moment."""
     TIMES[0] = 1000.0
-    made = Journal(tmp_path, lambda: TIMES[0], quota=3000)
+    made = Journal(tmp_path, lambda: TIMES[0], quota=30_000)
     made.create(c.Document(id="t")).result()
     made.append("t", [row(1)]).result()
     yield made
     made.close()
 
 
-def row(clock: int, title: str = "x") -> Row:
-    return Row(clock, "c", clock, "c", op_json(c.SetTerrain(fields=c.TerrainFields(title=title))))
+def row(clock: int) -> Row:
+    return Row(clock, "c", clock, "c", op_json(c.SetTerrain(fields=c.TerrainFields(title="x"))))
 
 
 def statements(journal: Journal) -> list[str]:
@@ -64,13 +64,15 @@ def test_one_that_is_refused_changes_nothing_and_the_next_is_taken(journal: Jour
     with pytest.raises(UsedTwice):
         journal.append("t", [row(1)]).result()
     with pytest.raises(HistoryFull):
-        journal.append("t", [row(2, "x" * 80)._replace(op=" " * 4000)]).result()
+        journal.append("t", [row(2)._replace(op=" " * 40_000)]).result()
     db = sqlite(journal).writer_db
-    db.execute("PRAGMA query_only=1")
-    with pytest.raises(Unwritable):
-        journal.append("t", [row(2)]).result()
+    pages = db.execute("PRAGMA page_count").fetchone()[0]
+    db.execute(f"PRAGMA max_page_count={pages}")
+    with pytest.raises(Unwritable, match="full") as failure:
+        journal.append("t", [row(2)._replace(op=" " * 20_000)]).result()
+    assert failure.value.full
     assert not journal.writable
-    db.execute("PRAGMA query_only=0")
+    db.execute("PRAGMA max_page_count=1000000")
     journal.append("t", [row(2)]).result()
     assert journal.writable
     assert not db.in_transaction

@@ -1,8 +1,9 @@
 """SQLite as the engine of a store: one file in the data folder, one writer thread, readers beside it.
 
 WAL mode, ``synchronous=FULL``. Whatever is queued when a commit ends goes into the next one (group commit), each item
-under its own savepoint, so one refused item does not undo the others. The lock of the data folder keeps other servers
-away, so nothing is fenced.
+under its own savepoint, so one refused item does not undo the others; one that is alone and a single statement is its
+own commit, as each statement gives the interpreter's lock away and waits for it. The lock of the data folder keeps
+other servers away, so nothing is fenced.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ from esker.store.upkeep.inspection import DATABASE_NAME, check
 
 T = TypeVar("T")
 Item = tuple[Callable[[sqlite3.Connection], Any], "Future[Any]"]
+Outcome = tuple["Future[Any]", Any, Exception | None]
+"""Of an item: what its write returned, or raised."""
 
 LOG_BYTES: Final = 9 << 20
 """How long the write-ahead log is from the start: more than the ``WRITERS_PAGES`` after which it is begun anew at the
@@ -76,30 +79,9 @@ class Sqlite:
         db = self.writer_db
         # From here on an item cannot be cancelled. An item whose HTTP client hung up before is not written.
         batch = [(write, future) for write, future in batch if future.set_running_or_notify_cancel()]
-        outcomes: list[tuple[Future[Any], Any, Exception | None]] = []
-        # Every statement gives the interpreter's lock away and waits for it, so an item that is alone has no savepoint,
-        # and where it is one statement that is the commit.
-        alone = len(batch) == 1
-        bare = alone and isinstance(batch[0][0], Write) and batch[0][0].is_one_statement()
         changes = db.total_changes
         try:
-            if not bare:
-                db.execute("BEGIN IMMEDIATE")
-            for write, future in batch:
-                if not alone:
-                    db.execute("SAVEPOINT item")
-                try:
-                    outcomes.append((future, write(db), None))
-                except Exception as error:
-                    if not bare:
-                        if not db.in_transaction:  # SQLite gave the whole transaction up: a full disk, an I/O error
-                            raise
-                        db.execute("ROLLBACK" if alone else "ROLLBACK TO item")
-                    outcomes.append((future, None, error))
-                if not alone:
-                    db.execute("RELEASE item")
-            if not bare and (not alone or outcomes[0][2] is None):
-                db.execute("COMMIT")
+            outcomes = self._by_itself(*batch[0]) if _is_one_statement(batch) else self._in_a_transaction(batch)
             # A statement that finds the disk full may end alone, and leave the transaction to the others of its batch.
             # A batch that found nothing to change is no sign that there is room again.
             if any(isinstance(failure, sqlite3.OperationalError) for _, _, failure in outcomes):
@@ -117,6 +99,35 @@ class Sqlite:
                 future.set_result(value)
             else:
                 future.set_exception(_as_asked(failure))
+
+    def _by_itself(self, write: Callable[[sqlite3.Connection], Any], future: Future[Any]) -> list[Outcome]:
+        """Runs a write whose one statement is its commit."""
+        try:
+            return [(future, write(self.writer_db), None)]
+        except Exception as error:
+            return [(future, None, error)]
+
+    def _in_a_transaction(self, batch: list[Item]) -> list[Outcome]:
+        """Runs writes in one commit. Raises sqlite3.Error where none of them is durable."""
+        db, outcomes = self.writer_db, list[Outcome]()
+        # Every statement gives the interpreter's lock away and waits for it, so an item that is alone has no savepoint.
+        alone = len(batch) == 1
+        db.execute("BEGIN IMMEDIATE")
+        for write, future in batch:
+            if not alone:
+                db.execute("SAVEPOINT item")
+            try:
+                outcomes.append((future, write(db), None))
+            except Exception as error:
+                if not db.in_transaction:  # SQLite gave the whole transaction up: a full disk, an I/O error
+                    raise
+                db.execute("ROLLBACK" if alone else "ROLLBACK TO item")
+                outcomes.append((future, None, error))
+            if not alone:
+                db.execute("RELEASE item")
+        if not alone or outcomes[0][2] is None:
+            db.execute("COMMIT")
+        return outcomes
 
     # --- reading ------------------------------------------------------------------------------------------------
 
@@ -162,6 +173,10 @@ class Sqlite:
         for db in self._open_readers:
             db.close()
         self.writer_db.close()
+
+
+def _is_one_statement(batch: list[Item]) -> bool:
+    return len(batch) == 1 and isinstance(batch[0][0], Write) and batch[0][0].is_one_statement()
 
 
 def connect(path: Path) -> sqlite3.Connection:
