@@ -29,7 +29,7 @@ from esker.store.upkeep.inspection import DATABASE_NAME, check
 T = TypeVar("T")
 Item = tuple[Callable[[sqlite3.Connection], Any], "Future[Any]"]
 Outcome = tuple["Future[Any]", Any, Exception | None]
-"""Of an item: what its write returned, or raised."""
+"""The future of an item, with what its write returned or raised."""
 
 LOG_BYTES: Final = 9 << 20
 """How long the write-ahead log is from the start: more than the ``WRITERS_PAGES`` after which it is begun anew at the
