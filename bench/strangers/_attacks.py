@@ -188,6 +188,15 @@ async def silent_connections(at: Target) -> int:
         _close(held)
 
 
+async def connections(at: Target) -> int:
+    """Connections that are opened and closed again, as fast as they are accepted."""
+
+    async def pass_by() -> None:
+        (await _connect(at))[1].transport.abort()
+
+    return await _many(at, pass_by, 1_000_000)
+
+
 async def _hold(held: list[asyncio.StreamWriter], opening: Awaitable[Pipe]) -> None:
     held.append((await opening)[1])
 
@@ -363,8 +372,8 @@ async def requests(at: Target) -> int:
 ATTACKS: Final[dict[str, Attack]] = {
     attack.__name__: attack
     for attack in (
-        bad_operations, continuations, pings, garbage, silent_connections, seats, history_rooms, new_rooms, heavy_room,
-        impossible_numbers, journal, deaf_readers, uploads, codes, requests,
+        bad_operations, continuations, pings, garbage, silent_connections, connections, seats, history_rooms, new_rooms,
+        heavy_room, impossible_numbers, journal, deaf_readers, uploads, codes, requests,
     )
 }  # fmt: skip
 BY_LINK: Final = frozenset({"bad_operations", "pings", "seats", "history_rooms", "requests", "exports"})

@@ -121,7 +121,7 @@ def test_orders_to_all_copies_have_turns_by_address(
     server: LiveServer, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """SPEC P532: one at a time, so many may wait; rooms that an order opens are counted for who gave it."""
-    Pupil(teacher, "Ada")
+    ada = Pupil(teacher, "Ada")
     made = server._server.config.app.state.classes  # type: ignore[union-attr]
     asked: list[Who] = []
     room = made.hub.room
@@ -131,9 +131,13 @@ def test_orders_to_all_copies_have_turns_by_address(
         return await room(terrain, who, **more)
 
     monkeypatch.setattr(made.hub, "room", opened)
-    assert teacher.ask("restart")[0] == 200
-    assert teacher.ask("push")[0] == 200
-    assert {who.address for who in asked} == {"127.0.0.1"}
+    own = server.join(teacher.terrain, teacher.secret, "t")
+    own.ops(("t:1", stroke("s1")), ("t:2", {"type": "stroke.finish", "stroke": "s1"}))
+    own.wait("ack")
+    asked.clear()
+    assert teacher.ask("push") == (200, {"changed": 1})
+    assert [who.address for who in asked] == ["127.0.0.1"]
+    assert server.http("GET", f"/api/terrains/{ada.terrain}/document", secret=ada.seat)[1]["strokes"]
 
     turns = Turns(classes.ORDERS, 1, classes.ORDERS_WAITING)
     monkeypatch.setattr(made, "_orders", turns)
@@ -145,6 +149,38 @@ def test_orders_to_all_copies_have_turns_by_address(
         status, refused = teacher.ask(what, body)
         assert (status, refused["code"]) == (429, "rate_limited"), what
     assert server.http("POST", f"/api/terrains/{teacher.terrain}/classes", {}, teacher.secret)[0] == 429
+
+
+def test_a_copy_for_which_an_order_has_nothing_is_not_opened(
+    server: LiveServer, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC P669: orders to copies that were as they should be opened twenty rooms a second, in the event loop."""
+    ada, ben = Pupil(teacher, "Ada"), Pupil(teacher, "Ben")
+    with_ada = ada.join("ada1")
+    with_ada.ops(("ada1:1", stroke("s1")))
+    with_ada.wait("ack")
+    hub = server._server.config.app.state.classes.hub  # type: ignore[union-attr]
+    opened: list[str] = []
+    before = hub._open
+
+    async def opening(terrain: str, who: Who) -> Any:
+        opened.append(terrain)
+        return await before(terrain, who)
+
+    monkeypatch.setattr(hub, "_open", opening)
+    assert teacher.ask("push") == (200, {"changed": 0})
+    assert teacher.ask("restart") == (200, {"changed": 1})
+    assert opened == [], "Ada's was open, Ben's is as it began"
+    with_ben = ben.join("ben1")
+    with_ben.ops(("ben1:1", stroke("s2")))
+    with_ben.wait("ack")
+    with_ben.close()
+    deadline = time.monotonic() + PATIENCE
+    while not hub.sleep(ben.terrain) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    opened.clear()
+    assert teacher.ask("restart") == (200, {"changed": 1})
+    assert opened == [ben.terrain], "who drew and left has theirs opened"
 
 
 def test_what_is_written_where_nobody_looks_is_solved_when_somebody_does(

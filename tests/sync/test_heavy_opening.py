@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import sys
+import weakref
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -125,6 +126,21 @@ def test_a_document_read_in_pieces_is_that_read_at_once(heavy: Document) -> None
     ):
         assert read_document(text) == read_document(text.encode()) == Document.model_validate_json(text)
     assert document_json(few) == few.model_dump_json()
+
+
+def test_a_stroke_that_is_held_is_read_once(heavy: Document) -> None:
+    """SPEC D383: thirty copies of a class that are open hold the strokes of one; what nobody holds is gone."""
+    few = heavy.model_copy(update={"strokes": heavy.strokes[:3], "deleted": heavy.strokes[3:5]})
+    copy = few.model_copy(
+        update={"id": "copy", "strokes": (*few.strokes[:2], few.strokes[2].model_copy(update={"label": "mine"}))}
+    )
+    first, second = read_document(document_json(few)), read_document(document_json(copy))
+    assert second == copy
+    assert [a is b for a, b in zip(first.strokes, second.strokes, strict=True)] == [True, True, False]
+    assert first.deleted[0] is second.deleted[0]
+    seen = weakref.ref(first.strokes[0])
+    del first, second
+    assert seen() is None
 
 
 NAMES = st.text(st.sampled_from('{}[]",:\\/ \n\u2028aä😀'), max_size=12)

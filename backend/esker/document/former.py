@@ -4,17 +4,20 @@ A journal is never refused for a limit that is younger than it. What comes over 
 number out of bounds is refused.
 
 Documents are read stroke by stroke: the parser keeps the interpreter while it reads a text, so a heavy document that is
-read at once in a thread makes all others wait for seconds, the event loop among them.
+read at once in a thread makes all others wait for seconds, the event loop among them. A stroke that somebody holds is
+not parsed again: copies of a class, and what is read once more, share theirs.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import logging
 import math
 import re
 from collections.abc import Callable, Iterator
 from typing import Any, Final, TypeVar
+from weakref import WeakValueDictionary
 
 from pydantic import ValidationError
 
@@ -32,6 +35,8 @@ LISTS: Final[dict[str, Any]] = {
     "deleted_layers": c.Layer,
 }
 """The lists of a document that can be long, with what is in them."""
+_HELD: Final[WeakValueDictionary[tuple[str, bytes], Any]] = WeakValueDictionary()
+"""Strokes and layers that somebody holds, by list and digest of what they were read from."""
 SPACE: Final = " \t\n\r"
 _TEXT: Final = r'"[^"\\]*+(?:\\.[^"\\]*+)*+"'
 _FLAT: Final = rf'\{{[^{{}}"]*+(?:{_TEXT}[^{{}}"]*+)*+\}}'
@@ -124,9 +129,13 @@ def _skipped(text: str, at: int) -> int:
 
 
 def _item(key: str, number: int, text: str) -> Any:
-    """One stroke or layer. Raises ValidationError that tells its place in the document."""
+    """Returns a stroke or layer: the one that somebody holds, where the text is the same. Raises ValidationError that
+    tells its place in the document."""
+    known = key, hashlib.sha256(text.encode()).digest()
+    if (held := _HELD.get(known)) is not None:
+        return held
     try:
-        return _mended(LISTS[key].model_validate_json, text)
+        return _HELD.setdefault(known, _mended(LISTS[key].model_validate_json, text))
     except ValidationError as error:
         found = error.errors(include_url=False)
         raise _invalid([{**one, "loc": (key, number, *one["loc"])} for one in found]) from None

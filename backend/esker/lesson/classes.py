@@ -319,6 +319,8 @@ class Classes:
             if self.hub.deletion.deleted(copy.terrain) is not None:
                 continue
             try:
+                if not await self._differs(copy, plan, who):
+                    continue
                 room = await self.hub.room(copy.terrain, who, shown=False)
                 ops = await self._planned(room, plan, who)
                 for op in merge.groups(ops):
@@ -333,6 +335,12 @@ class Classes:
         if refused:
             raise Cannot(409, "refused", refused)
         return changed
+
+    async def _differs(self, copy: Copy, plan: Callable[[StrokeSet], list[c.SimpleOp]], who: Who) -> bool:
+        """Whether ``plan`` may have something for a copy. One that nobody has open is not opened to find out."""
+        if self.hub.open_room(copy.terrain) is not None:
+            return True
+        return bool(await self.hub.read(who, plan, await self.hub.strokes(copy.terrain, None, who)))
 
     async def _planned(self, room: Room, plan: Callable[[StrokeSet], list[c.SimpleOp]], who: Who) -> list[c.SimpleOp]:
         """What ``plan`` says of a room as it is: a heavy one is compared in a thread."""
