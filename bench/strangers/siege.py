@@ -24,6 +24,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
@@ -241,6 +242,11 @@ async def _drawn(people: list[_Person], seconds: float) -> dict[str, Any]:
     }
 
 
+SOURCES: Final = (f"127.0.{100 + n // 250}.{1 + n % 250}" for n in count())
+"""Addresses of attackers, a new one each time: what an address may begin (terrains, links, exports) is used up by one
+attack, and the next would do nothing."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """How long people draw beside an attack, how long the server is left alone after it, and when to end."""
@@ -259,7 +265,7 @@ async def _besieged(
     server: Server, names: Sequence[str], plan: Plan, known: tuple[str, str], people: list[_Person], disk: Disk
 ) -> Any:
     """The people's figures while these attacks go on, and the server's and the disk's during and after."""
-    target = Target(server.base, *known, time.monotonic() + plan.seconds + 2)
+    target = Target(server.base, *known, time.monotonic() + plan.seconds + 2, next(SOURCES))
     attacker = multiprocessing.get_context("spawn").Process(target=_attack, args=(list(names), target), daemon=True)
     attacker.start()
     await asyncio.sleep(1.5)

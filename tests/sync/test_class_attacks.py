@@ -183,6 +183,38 @@ def test_a_copy_for_which_an_order_has_nothing_is_not_opened(
     assert opened == [ben.terrain], "who drew and left has theirs opened"
 
 
+def test_an_order_rests_after_each_copy_beside_people_of_another_address(
+    server: LiveServer, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SPEC P670: what orders read held the interpreter a third of the time, and nothing paced it."""
+    for name in ("Ada", "Ben"):
+        Pupil(teacher, name)
+    made = server._server.config.app.state.classes  # type: ignore[union-attr]
+    assert not made._is_shared("127.0.0.1"), "nobody of another address is there"
+    rested: list[tuple[str, float]] = []
+    rest = made._rest
+
+    async def resting(who: Who, took: float) -> None:
+        rested.append((who.home, took))
+        await rest(who, took)
+
+    monkeypatch.setattr(made, "_rest", resting)
+    assert teacher.ask("restart") == (200, {"changed": 0})
+    assert teacher.ask("together", {"numbers": [1, 2]})[0] == 201
+    assert [home for home, _ in rested] == ["127.0.0.1"] * 4
+    assert min(took for _, took in rested) > 0
+
+    def seconds() -> float:
+        began = time.monotonic()
+        asyncio.run(rest(Who("127.0.0.1"), 0.1))
+        return time.monotonic() - began
+
+    monkeypatch.setattr(made, "_is_shared", {"127.0.0.1"}.__contains__)
+    assert seconds() >= classes.ORDER_REST * 0.1
+    monkeypatch.setattr(made, "_is_shared", lambda _: False)
+    assert min(seconds() for _ in range(5)) < classes.ORDER_REST * 0.1
+
+
 def test_what_is_written_where_nobody_looks_is_solved_when_somebody_does(
     server: LiveServer, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
 ) -> None:

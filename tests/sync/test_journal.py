@@ -295,6 +295,9 @@ def test_snapshots_shorten_the_replay_and_change_nothing(either: Journal) -> Non
     past = either.load("t", upto=20)
     assert past is not None
     assert (past.document.clock, len(past.document.strokes)) == (20, 20)
+    assert either.document("t") == document
+    assert either.document("t", 20) == past.document
+    assert either.document("nothing") is None
     either.close()
 
 
@@ -304,8 +307,9 @@ def test_a_gap_or_an_op_that_does_not_apply_is_named(either: Journal) -> None:
         either.load("t")
     either.create(c.Document(id="u")).result()
     either.append("u", [_rows(1, 1)[0]._replace(op='{"type":"stroke.finish","stroke":"no"}')]).result()
-    with pytest.raises(DamagedTerrain, match="op 1 of u"):
-        either.load("u")
+    for read in (either.load, either.document):
+        with pytest.raises(DamagedTerrain, match="op 1 of u"):
+            read("u")
     either.close()
 
 

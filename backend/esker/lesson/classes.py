@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
+import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
 from functools import partial
@@ -52,6 +53,9 @@ MOST_KEPT: Final = 40
 ORDERS, ORDERS_WAITING = 4, 8
 """What teachers do to all copies of their classes: so much at a time on the server, of which one address has one; and
 what may wait of one address."""
+ORDER_REST: Final = 3.0
+"""Beside people of another address an order rests after each copy for so many times as long as that took: what it reads
+is neither a request nor a message, and holds the interpreter."""
 PLANS: Final = 3
 """What is to be done to a copy is planned in a thread so often, while somebody draws in it; then in the event loop."""
 
@@ -67,8 +71,9 @@ class Seat(NamedTuple):
 class Classes:
     """All classes of one server."""
 
-    def __init__(self, hub: Hub, grids: GridStore) -> None:
-        self.hub, self.grids = hub, grids
+    def __init__(self, hub: Hub, grids: GridStore, is_shared: Callable[[str], bool] = lambda _: False) -> None:
+        """``is_shared``: whether people of another address than this one, as ``Who.home`` names it, are there."""
+        self.hub, self.grids, self._is_shared = hub, grids, is_shared
         self.store = ClassStore(hub.journal)
         self._shown: dict[str, tuple[int, c.Shown]] = {}
         """What each class is shown, by class: the number of the copy, and how it is reached."""
@@ -318,6 +323,7 @@ class Classes:
         for copy in copies:
             if self.hub.deletion.deleted(copy.terrain) is not None:
                 continue
+            began = time.monotonic()
             try:
                 if not await self._differs(copy, plan, who):
                     continue
@@ -332,9 +338,15 @@ class Classes:
                 refused = f"Copy {copy.number} could not take it: {error.message}"
             finally:
                 self.hub.sleep(copy.terrain)
+                await self._rest(who, time.monotonic() - began)
         if refused:
             raise Cannot(409, "refused", refused)
         return changed
+
+    async def _rest(self, who: Who, took: float) -> None:
+        """Rests after one copy, for those of other addresses."""
+        if self._is_shared(who.home):
+            await asyncio.sleep(ORDER_REST * took)
 
     async def _differs(self, copy: Copy, plan: Callable[[StrokeSet], list[c.SimpleOp]], who: Who) -> bool:
         """Whether ``plan`` may have something for a copy. One that nobody has open is not opened to find out."""
@@ -358,8 +370,10 @@ class Classes:
             made = merge.Together(await self.beginning(lesson, who))
             try:
                 for copy in copies:
+                    began = time.monotonic()
                     found = await self.hub.strokes(copy.terrain, None, who)
                     await self.hub.read(who, made.add, found.strokes.values())
+                    await self._rest(who, time.monotonic() - began)
                 document = await self.hub.read(who, made.document, title.strip() or lesson.title)
             except Refusal as refusal:
                 message = f"Together they are too much for one terrain. {refusal.message}"

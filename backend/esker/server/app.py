@@ -103,7 +103,7 @@ def create_app(
     )
     laps = Laps()
     _stand_before(app, front, member, laps)
-    classes = Classes(hub, grids)
+    classes = Classes(hub, grids, laps.is_shared)
     collections = Collections(classes, data / "collections")
     if member is not None and member.rooms is not None:
         member.rooms.jobs += [imports, exports, collections]

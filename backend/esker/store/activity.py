@@ -71,8 +71,8 @@ class ActivityLogs:
 
     def _begin(self, terrain: str, newest: int) -> ActivityLog:
         start = max(0, newest - self._reach)
-        loaded = self._journal.load(terrain, 0) if start == 0 else None
-        return ActivityLog(None if loaded is None else loaded.document.to_document(), start)
+        born = self._journal.document(terrain, 0) if start == 0 else None
+        return ActivityLog(None if born is None else born.to_document(), start)
 
     def _entries(self, terrain: str, after: int, upto: int) -> Iterator[JournalEntry]:
         known = timestamps.read_timestamps(self._journal.reader(), terrain, after, upto)

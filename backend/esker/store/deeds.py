@@ -7,8 +7,9 @@ from typing import Protocol
 
 from esker.document.former import read_op
 from esker.document.history.folding import SILENT, UNLIMITED, silent
+from esker.document.ops import StrokeSet
 from esker.document.takeback import Deeds
-from esker.store.journal import Loaded, Row
+from esker.store.journal import Row
 
 
 class Source(Protocol):
@@ -16,7 +17,7 @@ class Source(Protocol):
 
     def first_by(self, terrain: str, clients: Sequence[str]) -> int | None: ...
 
-    def load(self, terrain: str, upto: int | None = None) -> Loaded | None: ...
+    def document(self, terrain: str, upto: int | None = None) -> StrokeSet | None: ...
 
     def steps(self, terrain: str, after: int, upto: int | None = None) -> list[Row]: ...
 
@@ -28,10 +29,9 @@ def read_deeds(journal: Source, terrain: str, clients: Sequence[str]) -> Deeds:
     """
     deeds = Deeds(clients)
     first = journal.first_by(terrain, clients)
-    loaded = None if first is None else journal.load(terrain, first - 1)
-    if loaded is None:
+    document = None if first is None else journal.document(terrain, first - 1)
+    if document is None:
         return deeds
-    document = loaded.document
     for row in journal.steps(terrain, document.clock):
         if row.op == SILENT:
             document = silent(document)

@@ -283,8 +283,23 @@ class Journal:
                 raise DamagedTerrain(f"the journal of {terrain}: {error}") from error
         return folds.filled(rows, Row(0, "-", 0, "", SILENT), after, end)
 
+    def document(self, terrain: str, upto: int | None = None) -> StrokeSet | None:
+        """The document at clock ``upto`` (default: now), or None. Raises DamagedTerrain when it does not replay."""
+        found = self._stored(terrain, upto)
+        return None if found is None else _replayed(terrain, *found)
+
     def load(self, terrain: str, upto: int | None = None) -> Loaded | None:
-        """The terrain at clock ``upto`` (default: now), or None. Raises DamagedTerrain when it does not replay."""
+        """What a room begins with at clock ``upto`` (default: now), or None. Raises DamagedTerrain as ``document``."""
+        with self.at_one_moment() as db:
+            found = self._stored(terrain, upto)
+            if found is None:
+                return None
+            counters = db.execute("SELECT client, max(counter) FROM ops WHERE terrain=? GROUP BY client", (terrain,))
+            known = dict(counters.fetchall())
+        return Loaded(_replayed(terrain, *found), [_as_read(row) for row in found[1]], known)
+
+    def _stored(self, terrain: str, upto: int | None) -> tuple[tuple[int, bytes], list[Row]] | None:
+        """The newest snapshot up to a clock, with its own, and the rows since. Raises DamagedTerrain."""
         with self.at_one_moment() as db:  # what is being folded meanwhile is, or is not
             snapshot = db.execute(
                 "SELECT clock, document FROM snapshots WHERE terrain=? AND clock<=? ORDER BY clock DESC LIMIT 1",
@@ -292,15 +307,8 @@ class Journal:
             ).fetchone()
             if snapshot is None:
                 return None
-            rows = self.steps(terrain, int(snapshot[0]), upto)
-            counters = db.execute("SELECT client, max(counter) FROM ops WHERE terrain=? GROUP BY client", (terrain,))
-            known = dict(counters.fetchall())
-        try:
-            text = decompressed(snapshot[1])
-        except ValueError as error:
-            raise DamagedTerrain(f"the journal of {terrain} at op {snapshot[0]}: {error}") from error
-        document = StrokeSet.from_document(read_document(text))
-        return Loaded(replay(document, rows), [_as_read(row) for row in rows], known)
+            clock = int(snapshot[0])
+            return (clock, snapshot[1]), self.steps(terrain, clock, upto)
 
     def grids(self, terrain: str | None = None) -> set[str]:
         """Digests of the grids that were ever layers of a terrain (default: of any), deleted ones too."""
@@ -343,6 +351,15 @@ def replay(document: StrokeSet, rows: Iterable[Row]) -> StrokeSet:
         except (Refusal, ValueError) as error:
             raise DamagedTerrain(f"op {row.clock} of {document.id} does not apply: {error}") from error
     return document
+
+
+def _replayed(terrain: str, snapshot: tuple[int, bytes], rows: Sequence[Row]) -> StrokeSet:
+    clock, kept = snapshot
+    try:
+        text = decompressed(kept)
+    except ValueError as error:
+        raise DamagedTerrain(f"the journal of {terrain} at op {clock}: {error}") from error
+    return replay(StrokeSet.from_document(read_document(text)), rows)
 
 
 def _as_read(row: Row) -> Row:

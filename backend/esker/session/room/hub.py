@@ -321,12 +321,12 @@ class Hub:
         if room is not None and (at is None or at >= room.core.document.clock):
             return room.core.document
         try:
-            loaded = await self.read(who, self.journal.load, terrain, at)
+            found = await self.read(who, self.journal.document, terrain, at)
         except DamagedTerrain as error:
             raise Denied("server_error", "The journal of this terrain is damaged; nothing was changed.") from error
-        if loaded is None:
+        if found is None:
             raise Denied("no_terrain", "There is no such terrain on this server.")
-        return loaded.document
+        return found
 
     async def delete(self, link: Link) -> float:
         """Deletes the terrain of an owner's link: closes everybody in it. Returns when it will be gone for good.

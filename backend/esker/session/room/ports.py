@@ -7,6 +7,7 @@ from concurrent.futures import Future
 from typing import Protocol
 
 from esker import contract as c
+from esker.document.ops import StrokeSet
 from esker.store.journal import Loaded, Row
 from esker.store.timestamps import Person
 
@@ -32,6 +33,8 @@ class Journal(Protocol):
     def newest(self, terrain: str) -> int: ...
 
     def load(self, terrain: str, upto: int | None = None) -> Loaded | None: ...
+
+    def document(self, terrain: str, upto: int | None = None) -> StrokeSet | None: ...
 
     def steps(self, terrain: str, after: int, upto: int | None = None) -> list[Row]: ...
 

@@ -102,10 +102,9 @@ class Compaction:
                 began = time.monotonic()
                 start = folds.folded_upto(journal.reader(), terrain)
                 if document is None or document.clock != start:
-                    loaded = journal.load(terrain, start)
-                    if loaded is None or loaded.document.clock > start:
+                    document = journal.document(terrain, start)
+                    if document is None or document.clock > start:
                         return
-                    document = loaded.document
                 stretch, document = self._stretch(document, last)
                 if not journal.submit(self._write(stretch), terrain).result():
                     return
