@@ -13,7 +13,7 @@ from esker.document.wire import op_json
 from esker.session.room import history_view
 from esker.store import activity
 from esker.store.activity import ActivityLogs
-from esker.store.journal import Journal, Loaded, Row
+from esker.store.journal import Journal, Row
 
 PROFILE = {"kind": "profile", "first": (0, 0, 0), "last": (1, 1, 1), "curve": ((0, 1),), "finished": True}
 
@@ -35,9 +35,9 @@ class Watched(Journal):
         self.asked.append((after, 2**62 if upto is None else upto))
         return super().rows(terrain, after, upto)
 
-    def load(self, terrain: str, upto: int | None = None) -> Loaded | None:
+    def document(self, terrain: str, upto: int | None = None) -> StrokeSet | None:
         self.loads.append(upto)
-        return super().load(terrain, upto)
+        return super().document(terrain, upto)
 
 
 @pytest.fixture
