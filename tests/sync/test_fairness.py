@@ -191,14 +191,14 @@ def test_a_stranger_s_reading_does_not_hold_all_threads(live: LiveServer, monkey
     """SPEC P292: thirty requests that take long, and another terrain opens meanwhile."""
     strange, key = live.create()
     mine, secret = live.create()
-    held, load = threading.Event(), live.assembly.hub.journal.load
+    held, document = threading.Event(), live.assembly.hub.journal.document
 
     def slow(terrain: str, upto: int | None = None) -> Any:
         if terrain == strange:
             assert held.wait(PATIENCE)
-        return load(terrain, upto)
+        return document(terrain, upto)
 
-    monkeypatch.setattr(live.assembly.hub.journal, "load", slow)
+    monkeypatch.setattr(live.assembly.hub.journal, "document", slow)
     with ThreadPoolExecutor(30) as pool:
         path = f"/api/terrains/{strange}/archive"
         asked = [pool.submit(ask, live, STRANGER, "GET", path, None, key) for _ in range(30)]

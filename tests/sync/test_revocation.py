@@ -200,7 +200,7 @@ def test_what_is_read_while_the_link_is_revoked_is_not_sent(
     """SPEC P287."""
     terrain, owner = live.create()
     edit, secret = link(live, terrain, owner)
-    pause = Pause(monkeypatch, live.assembly.hub.journal, "load")
+    pause = Pause(monkeypatch, live.assembly.hub.journal, "document")
     with ThreadPoolExecutor(1) as pool:
         asked = pool.submit(live.http, "GET", f"/api/terrains/{terrain}{path}", None, secret)
         pause.meanwhile(lambda: revoke(live, terrain, owner, edit))
@@ -212,7 +212,7 @@ def test_a_copy_begun_before_is_not_made(live: LiveServer, monkeypatch: pytest.M
     """SPEC P287."""
     terrain, owner = live.create()
     edit, secret = link(live, terrain, owner)
-    pause = Pause(monkeypatch, live.assembly.hub.journal, "load")
+    pause = Pause(monkeypatch, live.assembly.hub.journal, "document")
     before = live.assembly.hub.journal.reader().execute("SELECT count(*) FROM terrains").fetchone()
     with ThreadPoolExecutor(1) as pool:
         asked = pool.submit(live.http, "POST", f"/api/terrains/{terrain}/fork", {}, secret)
