@@ -56,6 +56,9 @@ MINUTES: Final = 35.0
 """Within which it ends unless ``--minutes`` says otherwise; what there was no time for is listed."""
 ALL_SECONDS: Final = 45.0
 """About what an attack takes with its recovery where settling takes long: so much is kept for all of them at once."""
+SOURCES: Final = (f"127.0.{100 + n // 250}.{1 + n % 250}" for n in count())
+"""Addresses of attackers, a new one each time: what an address may begin (terrains, links, exports) is used up by one
+attack, and the next would do nothing."""
 SHORT: Final = (3.0, 1.0)
 """Seconds of drawing and of recovery in the short form."""
 ALONE_EVERY: Final = 5
@@ -240,11 +243,6 @@ async def _drawn(people: list[_Person], seconds: float) -> dict[str, Any]:
         "unanswered": sum(len(person.sent) for person in people),
         "closed": sum(person.closed for person in people),
     }
-
-
-SOURCES: Final = (f"127.0.{100 + n // 250}.{1 + n % 250}" for n in count())
-"""Addresses of attackers, a new one each time: what an address may begin (terrains, links, exports) is used up by one
-attack, and the next would do nothing."""
 
 
 @dataclass(frozen=True)

@@ -116,6 +116,12 @@ class LiveServer:
     def base(self) -> str:
         return self.assembly.base
 
+    @property
+    def state(self) -> Any:
+        """What the application holds for its routes."""
+        app: Any = self._server.config.app
+        return app.state
+
     # --- HTTP ---------------------------------------------------------------------------------------------------
 
     def http(self, method: str, path: str, body: Any = None, secret: str | None = None) -> tuple[int, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future
@@ -16,105 +15,26 @@ import pytest
 
 from esker import contract as c
 from esker.document.ops import Refusal
-from esker.errors import Cannot
 from esker.fairness.shares import Full, Rate, Rates, Share, Who
-from esker.fairness.turns import SERVER, FairThreads, Turns
+from esker.fairness.turns import SERVER, Turns
 from esker.lesson import classes, collect, merge, wall
-from esker.session import births
 from esker.session.ground.client import Client
 from esker.session.ground.jobs import Job
 from esker.session.ground.worker import Worker
 from esker.store.access import Link
 from esker.store.classes import forget_empty
-from esker.store.journal import Journal
 from tests.sync.harness import PATIENCE, LiveServer, stroke
+from tests.sync.test_births import document_of
 from tests.sync.test_classes import Pupil, Teacher
 from tests.sync.test_wall import Wall
-
-HERE, THERE = Who("192.0.2.1"), Who("192.0.2.2")
 
 
 @pytest.fixture(name="teacher")
 def _teacher(server: LiveServer) -> Teacher:
-    state: Any = server._server.config.app.state  # type: ignore[union-attr]
+    state: Any = server.state
     for name in ("new_terrains", "code_tries", "new_links", "class_asks", "exports"):
         setattr(state, name, Rates())
     return Teacher(server)
-
-
-def _document(name: str, strokes: int = 0) -> c.Document:
-    made = (c.Stroke(id=f"s{k}", kind="profile", first=(0, 0, 0), last=(9, 0, 0), curve=()) for k in range(strokes))
-    return c.Document(id=name, strokes=tuple(made))
-
-
-@pytest.fixture(name="journal")
-def _journal(tmp_path: Path) -> Iterator[Journal]:
-    journal = Journal(tmp_path)
-    yield journal
-    journal.close()
-
-
-def test_new_terrains_of_one_address_have_a_rate_in_bytes(journal: Journal) -> None:
-    """SPEC P531: what is refused is not written; another address is not refused for it."""
-
-    async def run() -> None:
-        born = births.Births(journal, FairThreads(1, "reading"), now=lambda: 0.0)
-        born.rates = Rates(Rate(1.0, 2_000.0))
-        await born.write(_document("a"), who=HERE)
-        with pytest.raises(Cannot) as refused:
-            await born.write(_document("b", 100), who=HERE)
-        assert (refused.value.status, refused.value.code) == (429, "rate_limited")
-        await born.write(_document("c"), who=THERE)
-
-    asyncio.run(run())
-    assert [journal.exists(name) for name in "abc"] == [True, False, True]
-
-
-def test_new_terrains_are_written_one_after_another(journal: Journal) -> None:
-    """SPEC P531: one heavy birth at a time lies before the changes of those who draw, each address in its turn."""
-    written: list[str] = []
-    more, waiting = threading.Event(), []
-    create = journal.create
-
-    def noted(document: c.Document, also: Any = None, by: str | None = None, kept: Any = None) -> Any:
-        assert kept is not None, "it was compressed before"
-        written.append(document.id)
-        waiting.append(journal.waiting)
-        return create(document, lambda _: more.wait(30), by, kept)
-
-    journal.create = noted  # type: ignore[method-assign]
-
-    async def run() -> None:
-        born = births.Births(journal, FairThreads(4, "reading"))
-        tasks = [asyncio.create_task(born.write(_document(f"h{k}"), who=HERE)) for k in range(3)]
-        while len(written) < 1:
-            await asyncio.sleep(0)
-        tasks.append(asyncio.create_task(born.write(_document("t"), who=THERE)))
-        for _ in range(200):
-            await asyncio.sleep(0)
-        assert len(written) == 1
-        more.set()
-        await asyncio.gather(*tasks)
-
-    asyncio.run(run())
-    assert len(written) == 4
-    assert max(waiting) == 0
-
-
-def test_an_address_waits_with_so_many_new_terrains(journal: Journal) -> None:
-    """SPEC P531."""
-
-    async def run() -> None:
-        born = births.Births(journal, FairThreads(1, "reading"))
-        async with born._turns.turn(THERE):
-            tasks = [asyncio.create_task(born.write(_document(f"h{k}"), who=HERE)) for k in range(births.WAITING)]
-            while len(born._turns._line) < births.WAITING:
-                await asyncio.sleep(0)
-            with pytest.raises(Full):
-                await born.write(_document("more"), who=HERE)
-        await asyncio.gather(*tasks)
-
-    asyncio.run(run())
 
 
 def test_orders_to_all_copies_have_turns_by_address(
@@ -122,7 +42,7 @@ def test_orders_to_all_copies_have_turns_by_address(
 ) -> None:
     """SPEC P532: one at a time, so many may wait; rooms that an order opens are counted for who gave it."""
     ada = Pupil(teacher, "Ada")
-    made = server._server.config.app.state.classes  # type: ignore[union-attr]
+    made = server.state.classes
     asked: list[Who] = []
     room = made.hub.room
 
@@ -159,7 +79,7 @@ def test_a_copy_for_which_an_order_has_nothing_is_not_opened(
     with_ada = ada.join("ada1")
     with_ada.ops(("ada1:1", stroke("s1")))
     with_ada.wait("ack")
-    hub = server._server.config.app.state.classes.hub  # type: ignore[union-attr]
+    hub = server.state.classes.hub
     opened: list[str] = []
     before = hub._open
 
@@ -189,7 +109,7 @@ def test_an_order_rests_after_each_copy_beside_people_of_another_address(
     """SPEC P670: what orders read held the interpreter a third of the time, and nothing paced it."""
     for name in ("Ada", "Ben"):
         Pupil(teacher, name)
-    made = server._server.config.app.state.classes  # type: ignore[union-attr]
+    made = server.state.classes
     assert not made._is_shared("127.0.0.1"), "nobody of another address is there"
     rested: list[tuple[str, float]] = []
     rest = made._rest
@@ -274,16 +194,16 @@ def test_a_room_is_attended_from_the_first_who_comes_to_the_last_who_leaves(
 
 def test_copies_are_put_together_one_after_another() -> None:
     """SPEC P533: as soon as they are too many it ends; none is held that is not in it."""
-    start = _document("start")
+    start = document_of("start")
     made = merge.Together(start)
-    made.add(_document("a", c.MAX_STROKES).strokes)
-    made.add(_document("b", c.MAX_STROKES).strokes)
+    made.add(document_of("a", c.MAX_STROKES).strokes)
+    made.add(document_of("b", c.MAX_STROKES).strokes)
     assert len(made.document("t").strokes) == c.MAX_STROKES
     looked = 0
 
     def different() -> Iterator[c.Stroke]:
         nonlocal looked
-        for each in _document("c", c.MAX_STROKES).strokes:
+        for each in document_of("c", c.MAX_STROKES).strokes:
             looked += 1
             yield each.model_copy(update={"last": (8.0, 0.0, 0.0)})
 
@@ -311,7 +231,7 @@ def test_deleted_classes_of_a_terrain_have_a_bound(server: LiveServer, teacher: 
 
 def test_classes_of_one_address_have_a_rate(server: LiveServer, teacher: Teacher) -> None:
     """SPEC P534: each counts as a new terrain, however many terrains they are made from."""
-    state: Any = server._server.config.app.state  # type: ignore[union-attr]
+    state: Any = server.state
     state.new_terrains = Rates(Rate(0.0, 3.0))
     answers = []
     for _ in range(5):
@@ -329,7 +249,7 @@ def test_a_class_without_copies_goes_after_its_grace(server: LiveServer, teacher
     other = Teacher(server)
     Pupil(other, "Ada")
     assert server.http("DELETE", f"{other.path}?at_once=true", secret=other.secret)[0] == 200
-    store = server._server.config.app.state.classes.store  # type: ignore[union-attr]
+    store = server.state.classes.store
     ended = store.find(teacher.made["id"]).ended
     journal = server.assembly.hub.journal
     journal.submit(lambda db: forget_empty(db, ended)).result()
@@ -381,7 +301,7 @@ def test_walls_have_a_share_by_address_and_count_as_pages(
 ) -> None:
     """SPEC P539: one too many is closed, and so is one that comes too fast; who leaves gives its place back."""
     monkeypatch.setattr(wall, "WALLS", Share(4, address=2))
-    walls = wall.Walls(server._server.config.app.state.classes)  # type: ignore[union-attr]
+    walls = wall.Walls(server.state.classes)
     who = Who("192.0.2.1", "link")
     with walls.watching("c", who), walls.watching("c", Who("192.0.2.1", "other")):
         with pytest.raises(Full), walls.watching("c", who):
@@ -401,7 +321,7 @@ def test_walls_have_a_share_by_address_and_count_as_pages(
 
 def test_walls_rest_by_what_they_took(server: LiveServer) -> None:
     """SPEC P539: all of one address take a tenth of the event loop, and all of the server a third."""
-    walls = wall.Walls(server._server.config.app.state.classes)  # type: ignore[union-attr]
+    walls = wall.Walls(server.state.classes)
     here = [Who("192.0.2.1", f"l{k}") for k in range(5)]
     with ExitStack() as held:
         for who in here:
@@ -455,7 +375,7 @@ def test_a_copy_that_a_wall_had_opened_sleeps_when_the_wall_goes(server: LiveSer
 
 
 def _walls(server: LiveServer) -> Any:
-    heard = server._server.config.app.state.classes.hear  # type: ignore[union-attr]
+    heard = server.state.classes.hear
     return next(each.__self__ for each in heard if isinstance(getattr(each, "__self__", None), wall.Walls))
 
 

@@ -61,7 +61,7 @@ class Pupil:
 @pytest.fixture(autouse=True)
 def _patient(server: LiveServer) -> None:
     """All these pupils sit behind one address, and are more than one class."""
-    state: Any = server._server.config.app.state  # type: ignore[union-attr]
+    state: Any = server.state
     state.new_terrains, state.code_tries = Rates(), Rates()
 
 

@@ -44,7 +44,7 @@ def test_a_code_of_a_terrain_says_who_is_in_and_no_secret(server: LiveServer) ->
 
 def test_a_code_of_a_class_counts_all_copies(server: LiveServer) -> None:
     """SPEC L150."""
-    state: Any = server._server.config.app.state  # type: ignore[union-attr]
+    state: Any = server.state
     state.new_terrains, state.code_tries = Rates(), Rates()
     teacher = Teacher(server)
     peers = [Pupil(teacher, name).join(f"room{name}") for name in ("Ada", "Ben")]
@@ -58,7 +58,7 @@ def test_a_code_of_a_class_counts_all_copies(server: LiveServer) -> None:
 
 def test_a_stranger_learns_nothing_and_is_slowed_down(server: LiveServer) -> None:
     """SPEC L151: wrong codes are guesses; a code that has ended with its link opens nothing here either."""
-    state: Any = server._server.config.app.state  # type: ignore[union-attr]
+    state: Any = server.state
     terrain, owner = server.create()
     link = server.http("POST", f"/api/terrains/{terrain}/links", {"role": "edit"}, owner)[1]
     made = server.http("POST", f"/api/terrains/{terrain}/codes", {"role": "edit"}, link["secret"])[1]
@@ -74,7 +74,7 @@ def test_a_stranger_learns_nothing_and_is_slowed_down(server: LiveServer) -> Non
 
 def test_a_projector_that_asks_all_day_takes_no_guesses_from_its_class(server: LiveServer) -> None:
     """SPEC L151: one address has the whole class behind it."""
-    state: Any = server._server.config.app.state  # type: ignore[union-attr]
+    state: Any = server.state
     terrain, owner = server.create()
     made = server.http("POST", f"/api/terrains/{terrain}/codes", {"role": "edit"}, owner)[1]
     state.code_tries = Rates(Rate(0.001, 2))

@@ -38,7 +38,7 @@ def scored(peer: Peer, points: int | None) -> dict[str, Any]:
 
 @pytest.fixture(autouse=True)
 def _patient(server: LiveServer) -> None:
-    state: Any = server._server.config.app.state  # type: ignore[union-attr]
+    state: Any = server.state
     state.new_terrains, state.code_tries = Rates(), Rates()
 
 

@@ -77,7 +77,7 @@ class Wall:
 
 @pytest.fixture(name="teacher")
 def _teacher(server: LiveServer) -> Teacher:
-    state: Any = server._server.config.app.state  # type: ignore[union-attr]
+    state: Any = server.state
     state.new_terrains, state.code_tries = Rates(), Rates()
     return Teacher(server)
 

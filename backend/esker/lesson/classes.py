@@ -53,9 +53,9 @@ MOST_KEPT: Final = 40
 ORDERS, ORDERS_WAITING = 4, 8
 """What teachers do to all copies of their classes: so much at a time on the server, of which one address has one; and
 what may wait of one address."""
-ORDER_REST: Final = 3.0
-"""Beside people of another address an order rests after each copy for so many times as long as that took: what it reads
-is neither a request nor a message, and holds the interpreter."""
+ORDER_REST, LONGEST_ORDER_REST = 3.0, 1.0
+"""Beside people of another address an order rests after each copy for so many times as long as that took, and for so
+many seconds at most: what it reads is neither a request nor a message, and holds the interpreter."""
 PLANS: Final = 3
 """What is to be done to a copy is planned in a thread so often, while somebody draws in it; then in the event loop."""
 
@@ -346,7 +346,7 @@ class Classes:
     async def _rest(self, who: Who, took: float) -> None:
         """Rests after one copy, for those of other addresses."""
         if self._is_shared(who.home):
-            await asyncio.sleep(ORDER_REST * took)
+            await asyncio.sleep(min(ORDER_REST * took, LONGEST_ORDER_REST))
 
     async def _differs(self, copy: Copy, plan: Callable[[StrokeSet], list[c.SimpleOp]], who: Who) -> bool:
         """Whether ``plan`` may have something for a copy. One that nobody has open is not opened to find out."""

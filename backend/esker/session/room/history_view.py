@@ -127,10 +127,9 @@ class HistoryReader:
         """
         start = self._nearest(clock)
         if start is None:
-            stored, rows = self._journal.document(self.document.id, clock), None
-            if stored is None:
+            found, rows = self._journal.document(self.document.id, clock), None
+            if found is None:
                 raise DamagedTerrain(f"the journal of {self.document.id} has no beginning")
-            found = stored
         else:
             steps = self._journal.steps(start.id, start.clock, clock)
             found, rows = replay(start, steps), steps if start is self.document else None
